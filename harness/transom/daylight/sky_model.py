@@ -1,0 +1,75 @@
+"""A sky with a level: luminance [cd/m²] as a function of direction, for any of the patterns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float64 = NDArray[np.float64]
+Vector = tuple[float, float, float]
+
+QUADRATURE_ORDER = 64  # In each of two altitude panels and in azimuth: CIE skies to better than 1e-8.
+
+
+class SkyPattern(Protocol):
+    """A sky's relative luminance; its scale is arbitrary."""
+
+    @property
+    def depends_on_sun(self) -> bool:
+        """Whether the luminance changes with the position of the sun."""
+
+    def relative_luminance(self, sin_altitude: Float64, cos_sun_angle: Float64) -> Float64:
+        """Relative luminance at altitudes above 0 and cosines of the angle from the sun (equal shapes in and out)."""
+
+
+@dataclass(frozen=True)
+class SkyModel:
+    """`scale` [cd/m²] times a pattern, around the sun at the unit vector `sun_direction`. No beam is part of it."""
+
+    pattern: SkyPattern
+    sun_direction: Vector
+    scale: float
+
+    def luminance(self, directions: Float64) -> Float64:
+        """Luminance [cd/m²] in unit directions (N, 3) -> (N,); 0 below the horizon."""
+        result = np.zeros(len(directions))
+        if self.scale > 0:
+            up = directions[:, 2] >= 0
+            seen = directions[up]
+            cos_sun_angle = seen @ np.array(self.sun_direction)
+            result[up] = self.scale * self.pattern.relative_luminance(seen[:, 2], cos_sun_angle)
+        return result
+
+    def zenith_luminance(self) -> float:
+        """Luminance of the zenith [cd/m²]."""
+        return self.scale * relative_zenith_luminance(self.pattern, math.asin(self.sun_direction[2]))
+
+    def horizontal_illuminance(self) -> float:
+        """Illuminance of the unobstructed horizontal plane by the sky alone [lx]."""
+        return self.scale * relative_horizontal_illuminance(self.pattern, math.asin(self.sun_direction[2]))
+
+
+def relative_zenith_luminance(pattern: SkyPattern, sun_altitude_rad: float) -> float:
+    """The pattern's value at the zenith."""
+    return float(pattern.relative_luminance(np.array([1.0]), np.array([math.sin(sun_altitude_rad)]))[0])
+
+
+def relative_horizontal_illuminance(pattern: SkyPattern, sun_altitude_rad: float) -> float:
+    """Integral of the pattern x sin(altitude) over the hemisphere [sr], by Gauss-Legendre quadrature.
+
+    The altitude range is split at the sun and azimuth counted from it, so that the cusp of the indicatrix falls on a
+    corner of the panels, where the nodes crowd.
+    """
+    node, weight = np.polynomial.legendre.leggauss(QUADRATURE_ORDER)
+    node, weight = (node + 1) / 2, weight / 2
+    split = min(max(sun_altitude_rad, 0.0), math.pi / 2)
+    altitude = np.concatenate([split * node, split + (math.pi / 2 - split) * node])
+    altitude_weight = np.concatenate([split * weight, (math.pi / 2 - split) * weight])
+    sine, cosine = np.sin(altitude)[:, None], np.cos(altitude)[:, None]
+    cos_sun_angle = sine * math.sin(sun_altitude_rad) + cosine * math.cos(sun_altitude_rad) * np.cos(math.pi * node)
+    relative = pattern.relative_luminance(np.broadcast_to(sine, cos_sun_angle.shape), cos_sun_angle)
+    return float(2 * math.pi * (altitude_weight @ (relative * sine * cosine) @ weight))
