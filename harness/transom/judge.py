@@ -1,0 +1,267 @@
+"""The verdict: the only place that decides. Everything before it measures, everything after it formats.
+
+With e = engine - reference, u the reference's standard uncertainty, b the engine's own numerical bias (added linearly),
+T the tolerance stated beforehand in scenes/tolerances.toml, and k the one-sided quantile for the whole suite:
+
+    |e| + b + k u <= T   PASS        |e| - b - k u > T   FAIL        else   INCONCLUSIVE
+
+k is Student's quantile (batches - 1 degrees of freedom) at the level that Sidak's formula leaves each of the m
+quantities judged together, 1 - (1 - alpha)^(1/m): noise alone turns one of them from right to wrong with chance alpha.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cache
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from scipy import stats
+
+from transom.errors import InputError
+from transom.suite import invalid_field
+
+GOOD_ENOUGH_SHARE = 1 / 3
+"""A reference can judge when k u is at most this share of the tolerance."""
+
+SELECTORS = ("scene", "view", "region", "condition", "method")
+
+QUANTITIES = (
+    "mean_relative_error_percent",
+    "bias_percent",
+    "sensor_percent",
+    "analytic_percent",
+    "agreement_percent",
+)
+
+
+class Outcome(StrEnum):
+    """Verdicts, best first."""
+
+    PASS = "PASS"
+    INCONCLUSIVE = "INCONCLUSIVE"
+    FAIL = "FAIL"
+    NO_REFERENCE = "NO_REFERENCE"
+    CRASHED = "CRASHED"
+
+
+EXIT_CODES = {
+    Outcome.PASS: 0,
+    Outcome.FAIL: 1,
+    Outcome.INCONCLUSIVE: 3,
+    Outcome.NO_REFERENCE: 4,
+    Outcome.CRASHED: 4,
+}
+EXIT_PRIORITY = (4, 2, 1, 3, 0)
+"""Highest wins first: crash or missing reference, wrong use, fail, inconclusive, pass."""
+
+
+class Tolerance(BaseModel):
+    """One rule of tolerances.toml: a bound [%] on a quantity, why, and what it applies to (nothing: everything)."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    quantity: Literal[
+        "mean_relative_error_percent", "bias_percent", "sensor_percent", "analytic_percent", "agreement_percent"
+    ]
+    tolerance: float = Field(gt=0.0, allow_inf_nan=False)
+    reason: str = Field(min_length=1)
+    scene: str | None = None
+    view: str | None = None
+    region: str | None = None
+    condition: str | None = None
+    method: str | None = None
+
+    def specificity(self) -> int:
+        return sum(getattr(self, name) is not None for name in SELECTORS)
+
+    def applies(self, subject: Subject) -> bool:
+        return self.quantity == subject.quantity and all(
+            getattr(self, name) in (None, getattr(subject, name)) for name in SELECTORS
+        )
+
+
+class ToleranceFile(BaseModel):
+    """scenes/tolerances.toml. alpha: family-wise error rate of a suite."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    format: Literal[1]
+    alpha: float = Field(default=0.05, gt=0.0, lt=0.5)
+    tolerances: list[Tolerance] = Field(min_length=1)
+
+    def find(self, subject: Subject) -> Tolerance | None:
+        """The most specific rule for a quantity, or None. Raises InputError when two rules are equally specific."""
+        rules = sorted((rule for rule in self.tolerances if rule.applies(subject)), key=Tolerance.specificity)
+        if not rules:
+            return None
+        best = rules[-1]
+        if len(rules) > 1 and rules[-2].specificity() == best.specificity():
+            raise InputError(
+                f"has two equally specific rules for {subject.quantity} of {subject.place()}",
+                file="tolerances.toml",
+                field="tolerances",
+                value=[rules[-2].tolerance, best.tolerance],
+                remedy="Name one more of " + ", ".join(SELECTORS),
+            )
+        return best
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One quantity to be judged. difference: engine minus reference; uncertainty: the reference's standard uncertainty;
+    numerical_bias: the engine's own; all in percent. batch_count: batches of the reference, 0 for one without noise."""
+
+    quantity: str
+    scene: str
+    view: str
+    region: str
+    condition: str
+    method: str
+    reference: str
+    difference: float
+    uncertainty: float = 0.0
+    numerical_bias: float = 0.0
+    batch_count: int = 0
+
+    def place(self) -> str:
+        """For people."""
+        return " / ".join(part for part in (self.scene, self.view, self.region, self.condition, self.method) if part)
+
+
+@dataclass(frozen=True)
+class Missing:
+    """A case without an answer to judge: its reference is missing, or a renderer crashed."""
+
+    outcome: Literal[Outcome.NO_REFERENCE, Outcome.CRASHED]
+    scene: str
+    view: str
+    condition: str
+    method: str
+    message: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The decision on one quantity. expanded_uncertainty: k u [%]. batches_needed: of the reference, to decide an
+    inconclusive one (None where more of them would not). reference_is_good_enough: k u <= T/3."""
+
+    outcome: Outcome
+    quantity: str
+    scene: str
+    view: str
+    region: str
+    condition: str
+    method: str
+    reference: str
+    difference: float | None
+    numerical_bias: float | None
+    expanded_uncertainty: float | None
+    tolerance: float | None
+    reason: str
+    reference_is_good_enough: bool | None
+    batches_needed: int | None = None
+
+
+def read_tolerances(path: Path) -> ToleranceFile:
+    """Reads tolerances.toml. Raises InputError for anything that is not exactly in its form."""
+    try:
+        return ToleranceFile.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except FileNotFoundError as error:
+        raise InputError("does not exist", file=path) from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"is not TOML ({error})", file=path) from error
+    except ValidationError as error:
+        raise invalid_field(error, path) from error
+
+
+@cache
+def coverage_factor(alpha: float, quantity_count: int, batch_count: int) -> float:
+    """k: one-sided Student quantile (normal for a reference without batches) at Sidak's level for `quantity_count`."""
+    level = 1 - (1 - alpha) ** (1 / max(quantity_count, 1))
+    if batch_count >= 2:
+        return float(stats.t.isf(level, batch_count - 1))
+    return float(stats.norm.isf(level))
+
+
+def decide(difference: float, uncertainty: float, numerical_bias: float, tolerance: float) -> Outcome:
+    """The rule, for an expanded uncertainty k u. A value that is not finite fails."""
+    if not math.isfinite(difference):
+        return Outcome.FAIL
+    if abs(difference) + numerical_bias + uncertainty <= tolerance:
+        return Outcome.PASS
+    if abs(difference) - numerical_bias - uncertainty > tolerance:
+        return Outcome.FAIL
+    return Outcome.INCONCLUSIVE
+
+
+def judge(subjects: Sequence[Subject], missing: Iterable[Missing], tolerances: ToleranceFile) -> list[Verdict]:
+    """A verdict for every subject that a tolerance names, and for every missing case."""
+    ruled = [(subject, rule) for subject in subjects if (rule := tolerances.find(subject)) is not None]
+    verdicts = [_judge_one(subject, rule, tolerances.alpha, len(ruled)) for subject, rule in ruled]
+    return verdicts + [_judge_missing(case) for case in missing]
+
+
+def exit_code(verdicts: Iterable[Verdict]) -> int:
+    """The exit code of a set of verdicts, highest wins: 4, 2, 1, 3, 0. Nothing judged is a missing reference: 4."""
+    codes = {EXIT_CODES[verdict.outcome] for verdict in verdicts}
+    return next((code for code in EXIT_PRIORITY if code in codes), 4)
+
+
+def _judge_one(subject: Subject, rule: Tolerance, alpha: float, quantity_count: int) -> Verdict:
+    factor = coverage_factor(alpha, quantity_count, subject.batch_count)
+    expanded = factor * subject.uncertainty
+    outcome = decide(subject.difference, expanded, subject.numerical_bias, rule.tolerance)
+    needed = None
+    if outcome is Outcome.INCONCLUSIVE:
+        needed = _batches_needed(subject, expanded, rule.tolerance)
+    return Verdict(
+        outcome=outcome,
+        quantity=subject.quantity,
+        scene=subject.scene,
+        view=subject.view,
+        region=subject.region,
+        condition=subject.condition,
+        method=subject.method,
+        reference=subject.reference,
+        difference=subject.difference,
+        numerical_bias=subject.numerical_bias,
+        expanded_uncertainty=expanded,
+        tolerance=rule.tolerance,
+        reason=rule.reason,
+        reference_is_good_enough=expanded <= GOOD_ENOUGH_SHARE * rule.tolerance,
+        batches_needed=needed,
+    )
+
+
+def _batches_needed(subject: Subject, expanded: float, tolerance: float) -> int | None:
+    """Batches at which k u, falling as 1/sqrt(batches), fits between the difference and the tolerance."""
+    size, bias = abs(subject.difference), subject.numerical_bias
+    room = max(tolerance - size - bias, size - bias - tolerance)
+    if room <= 0 or subject.batch_count == 0:
+        return None
+    return math.ceil(subject.batch_count * (expanded / room) ** 2)
+
+
+def _judge_missing(case: Missing) -> Verdict:
+    return Verdict(
+        outcome=case.outcome,
+        quantity="",
+        scene=case.scene,
+        view=case.view,
+        region="",
+        condition=case.condition,
+        method=case.method,
+        reference="",
+        difference=None,
+        numerical_bias=None,
+        expanded_uncertainty=None,
+        tolerance=None,
+        reason=case.message,
+        reference_is_good_enough=None,
+    )

@@ -1,0 +1,147 @@
+"""Suites: named lists of cases, from scenes/suites.toml (its form is in scenes/README.md)."""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from transom.daylight.condition import Condition, resolve_condition
+from transom.errors import InputError
+from transom.scene import load_scene, scene_root
+from transom.scene.model import ConditionSpec, Scene, View
+
+Named = TypeVar("Named", View, ConditionSpec)
+
+
+class CaseEntry(BaseModel):
+    """Views and conditions of one scene: names, "*" for all, or omitted for the scene's first."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    scene: str
+    views: list[str] | None = None
+    conditions: list[str] | None = None
+    sensors: bool = True
+
+
+class SuiteEntry(BaseModel):
+    """One suite. target_percent: mean relative standard error at which a published reference is good enough.
+
+    width: pictures are this wide and keep their view's proportions; omitted: the view's own size.
+    reference: who knows the truth.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    title: str
+    description: str = ""
+    target_percent: float = Field(default=1.0, gt=0.0)
+    width: int | None = Field(default=None, gt=0)
+    reference: Literal["mitsuba", "closed_form"] = "mitsuba"
+    cases: list[CaseEntry] = Field(min_length=1)
+
+
+class SuiteFile(BaseModel):
+    """scenes/suites.toml."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    format: Literal[1]
+    suites: dict[str, SuiteEntry]
+
+
+@dataclass(frozen=True)
+class SuiteCase:
+    """One scene in one condition: the views to render, at their final size, and whether to measure the sensors."""
+
+    scene: Scene
+    condition: Condition
+    views: tuple[View, ...]
+    sensors: bool
+
+
+@dataclass(frozen=True)
+class Suite:
+    """A suite with its scenes loaded and its conditions resolved."""
+
+    name: str
+    title: str
+    description: str
+    target_percent: float
+    reference: str
+    cases: tuple[SuiteCase, ...]
+
+
+def suites_file() -> Path:
+    return scene_root() / "suites.toml"
+
+
+def read_suites(path: Path | None = None) -> dict[str, SuiteEntry]:
+    """All suites by name, without loading a scene. Raises InputError for a malformed file."""
+    path = path or suites_file()
+    try:
+        return SuiteFile.model_validate(tomllib.loads(path.read_text(encoding="utf-8"))).suites
+    except FileNotFoundError as error:
+        raise InputError("does not exist", file=path) from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"is not TOML ({error})", file=path) from error
+    except ValidationError as error:
+        raise invalid_field(error, path) from error
+
+
+def load_suite(name: str, path: Path | None = None) -> Suite:
+    """A suite ready to run. Raises InputError for an unknown suite, scene, view or condition."""
+    suites = read_suites(path)
+    if name not in suites:
+        raise InputError("is not a suite", field="SUITE", value=name, remedy=f"Choose one of {', '.join(suites)}")
+    entry = suites[name]
+    cases = [case for line in entry.cases for case in _cases(line, entry.width)]
+    return Suite(name, entry.title, entry.description, entry.target_percent, entry.reference, tuple(cases))
+
+
+def choose(entries: Sequence[Named], names: Sequence[str] | None, scene: Scene, kind: str) -> tuple[Named, ...]:
+    """Entries by name: None the first, "*" all. Raises InputError for a name that the scene does not have."""
+    if names is None:
+        return tuple(entries[:1])
+    if list(names) == ["*"]:
+        return tuple(entries)
+    by_name = {entry.name: entry for entry in entries}
+    for name in names:
+        if name not in by_name:
+            raise InputError(
+                f"is not a {kind} of {scene.name}",
+                file=scene.file,
+                field=kind,
+                value=name,
+                remedy=f"Choose from {', '.join(by_name) or 'none: the scene has no ' + kind}",
+            )
+    return tuple(by_name[name] for name in names)
+
+
+def resized(view: View, width: int, height: int | None = None) -> View:
+    """The view at another size; without `height` it keeps its proportions."""
+    return dataclasses.replace(view, width=width, height=height or max(1, round(width * view.height / view.width)))
+
+
+def invalid_field(error: ValidationError, path: Path) -> InputError:
+    """The first problem of a malformed file as one line: its place, the value found, what is allowed."""
+    first = error.errors()[0]
+    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]).lstrip(".")
+    value = None if first["type"] == "missing" else first["input"]
+    return InputError(f"is refused: {first['msg']}", file=path, field=place or "file", value=value)
+
+
+def _cases(line: CaseEntry, width: int | None) -> list[SuiteCase]:
+    scene = load_scene(line.scene)
+    views = choose(scene.views, line.views, scene, "view")
+    if width is not None:
+        views = tuple(resized(view, width) for view in views)
+    specs = choose(scene.conditions, line.conditions, scene, "condition")
+    measured = line.sensors and bool(scene.sensors)
+    return [SuiteCase(scene, resolve_condition(spec, scene.site), views, measured) for spec in specs]
