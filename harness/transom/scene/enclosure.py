@@ -1,0 +1,132 @@
+"""Looks for open walls: light that enters through the openings must not find another way out of the building.
+
+Rays leave the room side of every opening and are reflected in random directions a few times. A ray that meets neither
+a surface nor an opening has found a hole that nobody declared: daylight that falls in there would be missing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transom.scene.model import Float64, Mesh
+
+TriangleIndex = NDArray[np.intp]
+
+RAY_COUNT = 512
+BOUNCE_COUNT = 3
+SEED = 20080321
+CHUNK = 16
+"""Rays at once: their table of edge sides stays in the processor's cache for a few thousand triangles."""
+
+
+@dataclass(frozen=True)
+class Escape:
+    """Rays of one opening that left the building. share: of RAY_COUNT rays; origin, direction: of one of them."""
+
+    share: float
+    outdoor_share: float
+    origin: Float64
+    direction: Float64
+
+
+class TriangleRays:
+    """Nearest hits of rays with all triangles of a mesh, by Plücker coordinates. Double precision, no acceleration."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        triangles, self.source = mesh.triangles()
+        self.centre = mesh.vertices.mean(axis=0)
+        corners = (mesh.vertices - self.centre)[triangles]
+        self.scale = float(np.abs(corners).max())
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        self.normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        self.offsets = np.einsum("ij,ij->i", self.normals, corners[:, 0])
+        edges = []
+        for k in range(3):
+            start, end = corners[:, k], corners[:, (k + 1) % 3]
+            edges.append(np.concatenate([np.cross(start, end), end - start], axis=1).T)
+        self.edges = edges
+
+    def nearest(self, origins: Float64, directions: Float64) -> tuple[Float64, TriangleIndex]:
+        """Distances (N,) [m], infinite without a hit, and triangle indices (N,) of rays beyond 1e-6 of the scene."""
+        distances, hits = np.empty(len(origins)), np.empty(len(origins), dtype=np.intp)
+        for begin in range(0, len(origins), CHUNK):
+            part = slice(begin, begin + CHUNK)
+            distances[part], hits[part] = self._nearest(origins[part] - self.centre, directions[part])
+        return distances, hits
+
+    def _nearest(self, origins: Float64, directions: Float64) -> tuple[Float64, TriangleIndex]:
+        line = np.concatenate([directions, np.cross(origins, directions)], axis=1)
+        # A line passes on one side of all three edges; the margin closes the cracks between neighbours.
+        margin = 1e-9 * self.scale**2
+        first, second, third = (line @ edge for edge in self.edges)
+        lowest = np.minimum(np.minimum(first, second), third)
+        highest = np.maximum(np.maximum(first, second), third)
+        ray, triangle = np.nonzero((lowest >= -margin) | (highest <= margin))
+        normals = self.normals[triangle]
+        speed = np.einsum("ij,ij->i", directions[ray], normals)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance = (self.offsets[triangle] - np.einsum("ij,ij->i", origins[ray], normals)) / speed
+        met = (np.abs(speed) > 1e-12) & (distance > 1e-6 * self.scale)
+        ray, triangle, distance = ray[met], triangle[met], distance[met]
+        # Written from far to near, the nearest hit of each ray is the one that stays.
+        order = np.argsort(-distance)
+        nearest = np.full(len(origins), np.inf)
+        hit = np.zeros(len(origins), dtype=np.intp)
+        nearest[ray[order]], hit[ray[order]] = distance[order], triangle[order]
+        return nearest, hit
+
+
+def find_escape(mesh: Mesh, opening_material: int, opening_materials: frozenset[int]) -> Escape:
+    """Walks light from the room side of one opening group and reports what leaves the building elsewhere.
+
+    The random numbers have a fixed seed: the same scene gives the same answer.
+    """
+    rays = TriangleRays(mesh)
+    random = np.random.default_rng(SEED)
+    triangle_material = mesh.face_material[rays.source]
+    is_opening = np.isin(triangle_material, list(opening_materials))
+    triangles, _ = mesh.triangles()
+    own = np.flatnonzero(triangle_material == opening_material)
+    corners = mesh.vertices[triangles[own]]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    chosen = random.choice(len(own), RAY_COUNT, p=area / area.sum())
+    u, v = np.sqrt(random.random(RAY_COUNT)), random.random(RAY_COUNT)
+    weights = np.stack([1.0 - u, u * (1.0 - v), u * v], axis=1)
+    start = np.einsum("nk,nkd->nd", weights, corners[chosen])
+    normals = rays.normals[own[chosen]]
+
+    outward = _diffuse(normals, random)
+    outdoor_share = float(np.mean(np.isinf(rays.nearest(start, outward)[0])))
+    origins, directions = start, _diffuse(-normals, random)
+    escaped_from, escaped_to = [], []
+    for _ in range(BOUNCE_COUNT + 1):
+        distance, hit = rays.nearest(origins, directions)
+        gone = np.isinf(distance)
+        escaped_from.append(origins[gone])
+        escaped_to.append(directions[gone])
+        stays = ~gone & ~is_opening[hit]
+        if not stays.any():
+            break
+        facing = rays.normals[hit[stays]]
+        against = np.einsum("ij,ij->i", facing, directions[stays]) > 0.0
+        facing = np.where(against[:, None], -facing, facing)
+        origins = origins[stays] + distance[stays, None] * directions[stays]
+        directions = _diffuse(facing, random)
+    origin, direction = np.concatenate(escaped_from), np.concatenate(escaped_to)
+    share = len(origin) / RAY_COUNT
+    if len(origin) == 0:
+        origin, direction = start, directions
+    return Escape(share, outdoor_share, origin[0], direction[0])
+
+
+def _diffuse(normals: Float64, random: np.random.Generator) -> Float64:
+    """Directions (N, 3) about unit normals (N, 3), distributed as the cosine: a normal plus a point of the sphere."""
+    sphere = random.normal(size=normals.shape)
+    sphere /= np.linalg.norm(sphere, axis=1, keepdims=True)
+    # The factor keeps the sum away from zero.
+    direction = normals + (1.0 - 1e-6) * sphere
+    unit: Float64 = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    return unit
