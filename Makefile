@@ -36,6 +36,12 @@ references: setup ## render the references that `make report` needs into referen
 doctor: setup ## say what the set-up looks like, and what to do about anything that is wrong
 	@$(transom) doctor
 
+.PHONY: format
+format: $(venv)/.requirements ## lay out all Python and C++ code as ruff and clang-format have it
+	@$(venv)/bin/ruff format
+	@$(venv)/bin/ruff check --fix
+	@tools/check.sh format
+
 .PHONY: lock
 lock: ## resolve requirements.in into requirements.lock again
 	@tools/lock.sh

@@ -2,6 +2,7 @@
 # Runs the project's checks one after the other, all of them even when one fails, and says at the end which passed.
 #
 #   tools/check.sh quick    layout, types, engine tests, Python tests but the slow ones (make test)
+#   tools/check.sh format   lay out the C++ files, and nothing else (make format)
 #   tools/check.sh all      the same with the slow tests, clang-tidy, the sanitizers and the wheel (make test-all)
 set -uo pipefail
 cd "$(dirname "$0")/.."
@@ -28,12 +29,15 @@ cpp_files() {
         grep -v '^engine/src/gl/'
 }
 
+# Only clang-format 14 is asked: versions lay out the same code differently.
+clang_format=$(command -v clang-format-14 || command -v clang-format)
+
 cpp_layout() {
-    if ! command -v clang-format >/dev/null; then
-        echo "clang-format is not installed: C++ layout not checked"
+    if ! "${clang_format:-false}" --version 2>/dev/null | grep -q 'version 14\.'; then
+        echo "clang-format 14 is not installed: C++ layout not checked"
         return
     fi
-    cpp_files | xargs -r clang-format --dry-run -Werror && echo "C++ layout: $(cpp_files | wc -l) files as .clang-format has them"
+    cpp_files | xargs -r "$clang_format" --dry-run -Werror && echo "C++ layout: $(cpp_files | wc -l) files as .clang-format has them"
 }
 
 sanitizer() {
@@ -55,6 +59,10 @@ wheel() {
 }
 
 mode=${1:-quick}
+if [ "$mode" = format ]; then
+    cpp_files | xargs -r "$clang_format" -i
+    exit
+fi
 check "ruff" "$bin/ruff" check
 check "ruff format" "$bin/ruff" format --check
 check "C++ layout" cpp_layout
