@@ -19,7 +19,7 @@ from rich.table import Table
 
 State = Literal["ok", "warn", "fail"]
 
-RADIANCE_PROGRAMS = ("oconv", "rtrace", "rpict", "rcontrib", "gensky", "gendaylit", "genskyvec")
+RADIANCE_PROGRAMS = ("oconv", "rtrace", "rpict", "rcontrib", "gensky", "gendaylit", "gendaymtx")
 PACKAGES = ("numpy", "scipy", "pvlib", "colour-science", "trimesh", "OpenEXR", "OpenImageIO", "pydantic", "plotly")
 SIMD_FEATURES = ("sse4_2", "avx", "avx2", "fma", "avx512f")
 SETUP = "Run `make setup`"
