@@ -42,9 +42,9 @@ TOML_MISTAKES = {
     "normal": ("normal = [0, 0, 2]", "normal = [0, 0, 0]", r"sensors\[0\]\.normal = \[0, 0, 0\] has no direction"),
     "grid on a line": ("edge_v_m = [0, 5, 0]", "edge_v_m = [2, 0, 0]", r"sensors\[0\]\.edge_u_m = .* spans no area with edge_v_m"),
     "grid without count": ("count = [2, 3]\n", "", r"sensors\[0\] has no points"),
-    "sky number": ('"cie:12"', '"cie:17"', r"conditions\[0\]\.sky = 'cie:17' is not one of the CIE skies 1\.\.16\. Allowed"),
-    "sky name": ('"cie:12"', '"cloudy"', r"sky = 'cloudy' is not a sky\. Allowed: \"cie:1\""),
-    "perez levels": ('"cie:12"', '"perez:600"', r"sky = 'perez:600' needs direct normal and diffuse"),
+    "sky number": ('"cie:12"', '"cie:17"', r"conditions\[0\]\.sky = 'cie:17' is not a CIE sky type 1 to 16\. Use"),
+    "sky name": ('"cie:12"', '"cloudy"', r"sky = 'cloudy' is not a sky\. Use \"cie:1\""),
+    "perez levels": ('"cie:12"', '"perez:600"', r"sky = 'perez:600' needs two irradiances"),
     "time form": ("2026-03-21T10:00", "21.3.2026 10:00", r"conditions\[0\]\.time = '21\.3\.2026 10:00' is not a time"),
     "time that does not exist": ("2026-03-21T10:00", "2026-02-30T10:00", r"time = '2026-02-30T10:00' is not a time \("),
     "two sky levels": ('sky = "cie:12"', "zenith_luminance_cd_m2 = 4000\ndiffuse_horizontal_illuminance_lx = 9000", r"conditions\[0\]\.diffuse_horizontal_illuminance_lx = 9000\.0 cannot stand beside"),
@@ -146,6 +146,14 @@ def test_scene_without_any_light_is_refused(tmp_path: Path) -> None:
     start, end = ROOM_TOML.index("[[openings]]"), ROOM_TOML.index("[[views]]")
     toml = ROOM_TOML[:start] + "[materials.glass]\nreflectance = 0.1\n" + ROOM_TOML[end:]
     assert re.search(r"neither openings nor emitters", line_of(write_scene(tmp_path / "room", toml)))
+
+
+def test_opening_in_front_of_an_uncut_wall_is_refused(tmp_path: Path) -> None:
+    # The whole south side is a wall, and the pane lies in its plane.
+    wall_and_pane = "usemtl wall\nf 1 2 6 5\nv 1 0 1\nv 3 0 1\nv 3 0 2\nv 1 0 2\nusemtl glass\nf 9 10 11 12"
+    obj = ROOM_OBJ.replace("usemtl glass\nf 1 2 6 5", wall_and_pane)
+    line = line_of(write_scene(tmp_path / "room", obj=obj))
+    assert re.search(r"opening 'south' .* is covered by another surface at most 1 cm away\. Cut the hole", line), line
 
 
 def test_small_seam_between_walls_is_not_an_open_wall(tmp_path: Path) -> None:

@@ -6,15 +6,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from transom.daylight.sky_choice import parse_sky
 from transom.errors import InputError
-from transom.scene.enclosure import RAY_COUNT, find_escape
+from transom.scene.enclosure import COVER_M, TriangleRays, find_escape
 from transom.scene.mesh import RawMesh
 from transom.scene.model import Mesh, Region, Scene
 from transom.scene.regions import region_objects
 from transom.scene.schema import SceneTable
 from transom.scene.wording import near, shown_path
 
-ESCAPE_TOLERANCE = 2.5 / RAY_COUNT
+RAY_COUNT = 512
+"""Rays that look for open walls, shared among the opening groups, with at least 128 each."""
+
+ESCAPE_TOLERANCE = 0.005
 """Share of rays that may leave: seams of a few millimetres are below it, a missing wall is far above."""
 
 
@@ -39,6 +43,15 @@ def check_names(table: SceneTable, file: str) -> None:
                     value=name,
                     remedy="Give each its own name",
                 )
+
+
+def check_skies(table: SceneTable, file: str) -> None:
+    """Each condition's sky is one that `transom.daylight` knows. Raises InputError."""
+    for index, condition in enumerate(table.conditions):
+        try:
+            parse_sky(condition.sky, f"conditions[{index}].sky")
+        except InputError as error:
+            raise InputError(str(error), file=file) from None
 
 
 def check_materials(table: SceneTable, raw: RawMesh, file: str) -> None:
@@ -140,15 +153,26 @@ def check_light(scene: Scene, file: str) -> None:
 
 
 def check_enclosure(scene: Scene, mesh_file: str) -> None:
-    """The room behind every opening is closed but for openings, whose fronts look outdoors. Raises InputError."""
+    """The room behind every opening is closed but for openings, which nothing covers and whose fronts look outdoors.
+
+    Raises InputError.
+    """
     opening_materials = {
         material.opening: index for index, material in enumerate(scene.materials) if material.opening >= 0
     }
+    rays, count = TriangleRays(scene.mesh), max(128, RAY_COUNT // max(1, len(scene.openings)))
     for index, opening in enumerate(scene.openings):
-        escape = find_escape(scene.mesh, opening_materials[index], frozenset(opening_materials.values()))
-        if escape.share <= ESCAPE_TOLERANCE:
-            continue
+        escape = find_escape(rays, opening_materials[index], frozenset(opening_materials.values()), count)
         field = f"opening {opening.name!r} (material {opening.material!r})"
+        if escape.covered_share > 0.5:
+            raise InputError(
+                f"is covered by another surface at most {100 * COVER_M:g} cm away",
+                file=mesh_file,
+                field=field,
+                remedy="Cut the hole into the wall that the opening fills",
+            )
+        if escape.share * count <= max(2.0, ESCAPE_TOLERANCE * count):
+            continue
         if escape.share > 0.3 and escape.outdoor_share < 0.5 * escape.share:
             raise InputError(
                 "has its front towards the room: faces of openings are counter-clockwise seen from outdoors",

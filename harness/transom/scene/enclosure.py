@@ -15,19 +15,25 @@ from transom.scene.model import Float64, Mesh
 
 TriangleIndex = NDArray[np.intp]
 
-RAY_COUNT = 512
 BOUNCE_COUNT = 3
 SEED = 20080321
+COVER_M = 0.01
+"""A surface this near to an opening covers it; in models below 10 m across, 1 / 1000 of that size."""
 CHUNK = 16
 """Rays at once: their table of edge sides stays in the processor's cache for a few thousand triangles."""
 
 
 @dataclass(frozen=True)
 class Escape:
-    """Rays of one opening that left the building. share: of RAY_COUNT rays; origin, direction: of one of them."""
+    """What rays of one opening met, as shares of the rays.
+
+    share: left the building; origin, direction: of one such ray. outdoor_share: from the outdoor side, met nothing.
+    covered_share: started where another surface lies within COVER_M of the opening.
+    """
 
     share: float
     outdoor_share: float
+    covered_share: float
     origin: Float64
     direction: Float64
 
@@ -36,9 +42,10 @@ class TriangleRays:
     """Nearest hits of rays with all triangles of a mesh, by Plücker coordinates. Double precision, no acceleration."""
 
     def __init__(self, mesh: Mesh) -> None:
-        triangles, self.source = mesh.triangles()
+        self.mesh = mesh
+        self.triangles, self.source = mesh.triangles()
         self.centre = mesh.vertices.mean(axis=0)
-        corners = (mesh.vertices - self.centre)[triangles]
+        corners = (mesh.vertices - self.centre)[self.triangles]
         self.scale = float(np.abs(corners).max())
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         self.normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
@@ -49,15 +56,22 @@ class TriangleRays:
             edges.append(np.concatenate([np.cross(start, end), end - start], axis=1).T)
         self.edges = edges
 
-    def nearest(self, origins: Float64, directions: Float64) -> tuple[Float64, TriangleIndex]:
-        """Distances (N,) [m], infinite without a hit, and triangle indices (N,) of rays beyond 1e-6 of the scene."""
+    def nearest(
+        self, origins: Float64, directions: Float64, ignored: NDArray[np.bool_] | None = None
+    ) -> tuple[Float64, TriangleIndex]:
+        """Distances (N,) [m], infinite without a hit, and triangle indices (N,) of rays beyond 1e-6 of the scene.
+
+        ignored: (T,) triangles that rays pass through.
+        """
         distances, hits = np.empty(len(origins)), np.empty(len(origins), dtype=np.intp)
         for begin in range(0, len(origins), CHUNK):
             part = slice(begin, begin + CHUNK)
-            distances[part], hits[part] = self._nearest(origins[part] - self.centre, directions[part])
+            distances[part], hits[part] = self._nearest(origins[part] - self.centre, directions[part], ignored)
         return distances, hits
 
-    def _nearest(self, origins: Float64, directions: Float64) -> tuple[Float64, TriangleIndex]:
+    def _nearest(
+        self, origins: Float64, directions: Float64, ignored: NDArray[np.bool_] | None
+    ) -> tuple[Float64, TriangleIndex]:
         line = np.concatenate([directions, np.cross(origins, directions)], axis=1)
         # A line passes on one side of all three edges; the margin closes the cracks between neighbours.
         margin = 1e-9 * self.scale**2
@@ -70,6 +84,8 @@ class TriangleRays:
         with np.errstate(divide="ignore", invalid="ignore"):
             distance = (self.offsets[triangle] - np.einsum("ij,ij->i", origins[ray], normals)) / speed
         met = (np.abs(speed) > 1e-12) & (distance > 1e-6 * self.scale)
+        if ignored is not None:
+            met &= ~ignored[triangle]
         ray, triangle, distance = ray[met], triangle[met], distance[met]
         # Written from far to near, the nearest hit of each ray is the one that stays.
         order = np.argsort(-distance)
@@ -79,27 +95,28 @@ class TriangleRays:
         return nearest, hit
 
 
-def find_escape(mesh: Mesh, opening_material: int, opening_materials: frozenset[int]) -> Escape:
+def find_escape(rays: TriangleRays, opening_material: int, opening_materials: frozenset[int], ray_count: int) -> Escape:
     """Walks light from the room side of one opening group and reports what leaves the building elsewhere.
 
     The random numbers have a fixed seed: the same scene gives the same answer.
     """
-    rays = TriangleRays(mesh)
     random = np.random.default_rng(SEED)
-    triangle_material = mesh.face_material[rays.source]
+    triangle_material = rays.mesh.face_material[rays.source]
     is_opening = np.isin(triangle_material, list(opening_materials))
-    triangles, _ = mesh.triangles()
     own = np.flatnonzero(triangle_material == opening_material)
-    corners = mesh.vertices[triangles[own]]
+    corners = rays.mesh.vertices[rays.triangles[own]]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    chosen = random.choice(len(own), RAY_COUNT, p=area / area.sum())
-    u, v = np.sqrt(random.random(RAY_COUNT)), random.random(RAY_COUNT)
+    chosen = random.choice(len(own), ray_count, p=area / area.sum())
+    u, v = np.sqrt(random.random(ray_count)), random.random(ray_count)
     weights = np.stack([1.0 - u, u * (1.0 - v), u * v], axis=1)
     start = np.einsum("nk,nkd->nd", weights, corners[chosen])
     normals = rays.normals[own[chosen]]
 
     outward = _diffuse(normals, random)
     outdoor_share = float(np.mean(np.isinf(rays.nearest(start, outward)[0])))
+    near = min(COVER_M, 0.002 * rays.scale)
+    through = rays.nearest(start + near * normals, -normals, is_opening)[0]
+    covered_share = float(np.mean(through <= 2.0 * near))
     origins, directions = start, _diffuse(-normals, random)
     escaped_from, escaped_to = [], []
     for _ in range(BOUNCE_COUNT + 1):
@@ -116,10 +133,10 @@ def find_escape(mesh: Mesh, opening_material: int, opening_materials: frozenset[
         origins = origins[stays] + distance[stays, None] * directions[stays]
         directions = _diffuse(facing, random)
     origin, direction = np.concatenate(escaped_from), np.concatenate(escaped_to)
-    share = len(origin) / RAY_COUNT
+    share = len(origin) / ray_count
     if len(origin) == 0:
         origin, direction = start, directions
-    return Escape(share, outdoor_share, origin[0], direction[0])
+    return Escape(share, outdoor_share, covered_share, origin[0], direction[0])
 
 
 def _diffuse(normals: Float64, random: np.random.Generator) -> Float64:

@@ -13,9 +13,6 @@ from pydantic_core import PydanticCustomError
 
 Vector = tuple[float, float, float]
 
-SKY_NAMES = ("clear", "overcast", "uniform", "none")
-SKY_FORMS = '"cie:1" .. "cie:16", "clear", "overcast", "uniform", "perez:DNI,DHI" or "none"'
-
 
 def fail(problem: str, remedy: str = "", field: str = "", value: object = None) -> PydanticCustomError:
     """The error a validator raises: `problem` follows `field = value`, `remedy` is a sentence of its own.
@@ -161,30 +158,6 @@ def check_time(value: object) -> str:
     return value
 
 
-def check_sky(value: object) -> str:
-    """A sky by name; the same forms as on the command line."""
-    problem, remedy = "is not a sky", f"Allowed: {SKY_FORMS}"
-    if not isinstance(value, str):
-        raise fail(problem, remedy)
-    kind, _, rest = value.partition(":")
-    if value in SKY_NAMES:
-        return value
-    if kind == "cie":
-        if not re.fullmatch(r"\d{1,2}", rest) or not 1 <= int(rest) <= 16:
-            raise fail("is not one of the CIE skies 1..16", remedy)
-        return value
-    if kind == "perez":
-        parts = rest.split(",")
-        try:
-            levels = [float(part) for part in parts]
-        except ValueError:
-            levels = []
-        if len(levels) != 2 or not all(math.isfinite(level) and 0 <= level <= 2000 for level in levels):
-            raise fail("needs direct normal and diffuse horizontal irradiance in 0..2000 W/m²", 'Like "perez:600,150"')
-        return value
-    raise fail(problem, remedy)
-
-
 def listed(check: Callable[[Any], Any], meaning: str) -> PlainValidator:
     """A list of at least one value that `check` accepts."""
 
@@ -209,4 +182,3 @@ Name = Annotated[str, PlainValidator(check_name)]
 Point = Annotated[Vector, PlainValidator(check_vector)]
 Direction = Annotated[Vector, PlainValidator(check_direction)]
 Time = Annotated[str, PlainValidator(check_time)]
-Sky = Annotated[str, PlainValidator(check_sky)]

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transom.errors import InputError
-from transom.scene.mesh import RawMesh
+from transom.scene.mesh import Polygon, RawMesh
 from transom.scene.model import Float64, Int32, Mesh
-from transom.scene.polygons import area_vector, has_no_area, split_polygon, without_repeats
+from transom.scene.polygons import area_vector, has_no_area, is_plain, split_polygon, without_repeats
 from transom.scene.schema import METRES_PER_UNIT
 from transom.scene.wording import shown_path
 
@@ -51,15 +51,12 @@ def build_mesh(
     faces, face_material, face_object = [], [], []
     given: list[Float64 | None] = []
     is_smooth = []
-    for polygon in raw.polygons:
+    plain = _plain_polygons(raw, vertices, welded)
+    for polygon, stays in zip(raw.polygons, plain, strict=True):
         corners = tuple(int(i) for i in welded[list(polygon.corners)])
-        kept = without_repeats(corners)
-        points = vertices[[corners[i] for i in kept]]
-        if has_no_area(points):
-            _refuse_flat(raw, polygon.place, polygon.object, polygon.material, points)
-        for part in split_polygon(points):
-            positions = [kept[i] for i in part]
-            faces.append([corners[i] for i in positions] + [-1] * (4 - len(part)))
+        points = vertices[list(corners)]
+        for positions in [tuple(range(len(corners)))] if stays else _split(raw, polygon, corners, points):
+            faces.append([corners[i] for i in positions] + [-1] * (4 - len(positions)))
             face_material.append(materials[polygon.material])
             face_object.append(objects.setdefault(polygon.object, len(objects)))
             is_smooth.append(polygon.material in smooth)
@@ -100,11 +97,30 @@ def _without_unused(vertices: Float64, faces: Int32) -> tuple[Float64, Int32]:
     return vertices[used], rank[faces]
 
 
-def _refuse_flat(raw: RawMesh, place: str, name: str, material: str, points: Float64) -> None:
+def _plain_polygons(raw: RawMesh, vertices: Float64, welded: Int32) -> NDArray[np.bool_]:
+    """Which polygons become one face as they are; found for all triangles, then all quads, at once."""
+    plain = np.zeros(len(raw.polygons), dtype=bool)
+    for count in (3, 4):
+        chosen = [index for index, polygon in enumerate(raw.polygons) if len(polygon.corners) == count]
+        if chosen:
+            corners = welded[np.array([raw.polygons[index].corners for index in chosen])]
+            plain[chosen] = is_plain(vertices[corners])
+    return plain
+
+
+def _split(raw: RawMesh, polygon: Polygon, corners: tuple[int, ...], points: Float64) -> list[tuple[int, ...]]:
+    """The faces of one polygon as positions in `corners`. Raises InputError when it has no area."""
+    kept = without_repeats(corners)
+    if has_no_area(points[kept]):
+        _refuse_flat(raw, polygon, points)
+    return [tuple(kept[i] for i in part) for part in split_polygon(points[kept])]
+
+
+def _refuse_flat(raw: RawMesh, polygon: Polygon, points: Float64) -> None:
     where = ", ".join(f"{value:.4g}" for value in points.mean(axis=0))
     raise InputError(
-        f"(object {name!r}, material {material!r}) has no area, near ({where}) m",
-        file=f"{shown_path(raw.file)}, {place}",
+        f"(object {polygon.object!r}, material {polygon.material!r}) has no area, near ({where}) m",
+        file=f"{shown_path(raw.file)}, {polygon.place}",
         field="face",
         remedy="Delete it, or merge its vertices in the modelling program",
     )

@@ -66,6 +66,7 @@ def load_scene(name_or_path: str | Path) -> Scene:
     table = _read_table(file)
     shown = shown_path(file)
     checks.check_names(table, shown)
+    checks.check_skies(table, shown)
 
     mesh_path = file.parent / table.mesh.file
     if not mesh_path.is_file():

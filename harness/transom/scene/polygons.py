@@ -13,6 +13,9 @@ PLANAR_TOLERANCE = 1e-5
 FLAT_TOLERANCE = 1e-9
 """Area per squared diameter below which a face counts as having none."""
 
+STRAIGHT_TOLERANCE = 1e-7
+"""Sine of the turn below which a corner counts as straight."""
+
 
 def area_vector(points: Float64) -> Float64:
     """Normal of a polygon with corners (n, 3), as long as its area [m²] (Newell's sum)."""
@@ -29,6 +32,29 @@ def diameter(points: Float64) -> float:
 def has_no_area(points: Float64) -> bool:
     """Whether the polygon is a line or a point."""
     return float(np.linalg.norm(area_vector(points))) <= FLAT_TOLERANCE * diameter(points) ** 2
+
+
+def is_plain(points: Float64) -> NDArray[np.bool_]:
+    """Which of the triangles (N, 3, 3) or quads (N, 4, 3) can stay as they are: with area, planar, strictly convex.
+
+    The same tests as `has_no_area` and `split_polygon`, for many faces at once.
+    """
+    centred = points - points[:, :1]
+    normal = 0.5 * np.cross(centred, np.roll(centred, -1, axis=1)).sum(axis=1)
+    area = np.linalg.norm(normal, axis=1)
+    size = np.linalg.norm(points.max(axis=1) - points.min(axis=1), axis=1)
+    plain: NDArray[np.bool_] = area > FLAT_TOLERANCE * size**2
+    if points.shape[1] == 3:
+        return plain
+    before, after = points - np.roll(points, 1, axis=1), np.roll(points, -1, axis=1) - points
+    turn = np.einsum("fcd,fd->fc", np.cross(before, after), normal)
+    scale = area[:, None] * np.linalg.norm(before, axis=2) * np.linalg.norm(after, axis=2)
+    plane = np.cross(centred[:, 1], centred[:, 2])
+    offset = np.abs(np.einsum("fd,fd->f", centred[:, 3], plane))
+    planar = offset <= PLANAR_TOLERANCE * size * np.linalg.norm(plane, axis=1)
+    convex: NDArray[np.bool_] = np.all(turn > STRAIGHT_TOLERANCE * scale, axis=1)
+    stays: NDArray[np.bool_] = plain & planar & convex
+    return stays
 
 
 def without_repeats(corners: tuple[int, ...]) -> list[int]:
@@ -73,7 +99,7 @@ def _weak_corners(points: Float64) -> NDArray[np.intp]:
     before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
     turn = np.cross(before, after) @ normal
     scale = float(np.linalg.norm(normal)) * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
-    return np.flatnonzero(turn <= 1e-7 * scale)
+    return np.flatnonzero(turn <= STRAIGHT_TOLERANCE * scale)
 
 
 def _proper(triangles: list[tuple[int, ...]], points: Float64) -> list[tuple[int, ...]]:

@@ -12,7 +12,6 @@ from transom.scene.fields import (
     Direction,
     Name,
     Point,
-    Sky,
     Switch,
     Text,
     Time,
@@ -151,7 +150,7 @@ class ConditionTable(Table):
 
     name: Name
     time: Time = "2026-03-21T12:00"
-    sky: Sky = "cie:12"
+    sky: Text = "cie:12"
     zenith_luminance_cd_m2: Annotated[float | None, positive("cd/m²")] = None
     diffuse_horizontal_illuminance_lx: Annotated[float | None, number(0.0, 2e5, "lx")] = None
     direct_normal_illuminance_lx: Annotated[float | None, number(0.0, 2e5, "lx")] = None
