@@ -9,6 +9,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import metadata, util
 from pathlib import Path
@@ -206,7 +207,7 @@ def _radiance() -> Check:
     if missing or not calculations:
         found = f"pyradiance {metadata.version('pyradiance')} without {', '.join(missing) or 'its lib folder'}"
         return Check("Radiance", "warn", found, f"Checks against Radiance are left out. {SETUP}")
-    version = _output([str(folder / "bin" / "rtrace"), "-version"]).strip()
+    version = _output([str(folder / "bin" / "rtrace"), "-version"], {"RAYPATH": str(folder / "lib")}).strip()
     found = f"pyradiance {metadata.version('pyradiance')}, {version or 'version unknown'}"
     raypath = os.environ.get("RAYPATH")
     if raypath and str(folder / "lib") not in raypath.split(os.pathsep):
@@ -243,10 +244,12 @@ def _install(what: Literal["GL", "LLVM"]) -> str:
     return f"Install {packages[what]}; `make setup` does."
 
 
-def _output(command: list[str]) -> str:
-    """What a program prints, or nothing if it cannot be run."""
+def _output(command: list[str], variables: Mapping[str, str] | None = None) -> str:
+    """What a program prints, or nothing if it cannot be run. variables: added to the environment."""
+    environment = {**os.environ, **(variables or {})}
     try:
-        return subprocess.run(command, capture_output=True, text=True, timeout=30, check=False).stdout
+        run = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False, env=environment)
+        return run.stdout
     except (OSError, subprocess.TimeoutExpired):
         return ""
 

@@ -21,7 +21,6 @@ add_library(transom_embree INTERFACE)
 target_link_libraries(transom_embree INTERFACE embree)
 string(REGEX MATCH "^[0-9]+" embree_major "${embree_VERSION}")
 target_compile_definitions(transom_embree INTERFACE TRANSOM_EMBREE_MAJOR=${embree_major})
-message(STATUS "Embree ${embree_VERSION}, TBB ${TBB_VERSION}, Eigen ${Eigen3_VERSION}, GLM ${glm_VERSION}")
 
 # nanobind comes from the Python that the module is built for: the project's own environment, unless told otherwise.
 macro(transom_find_nanobind)
