@@ -1,5 +1,7 @@
 """deflector_house: a living space with a long curved wall, skylights over a curved blue deflector, a west window."""
 
+from itertools import pairwise
+
 import numpy as np
 from furniture import SINK_M, chair, regular_polygon, shelf, table
 from mesh import Mesh, Point
@@ -65,7 +67,7 @@ def _deflector(mesh: Mesh) -> None:
     normals = np.stack([-1.0 * np.sin(arc), 1.9 * np.cos(arc)], axis=-1)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     xs = np.linspace(0.6, 6.0, 7)
-    for x0, x1 in zip(xs[:-1], xs[1:], strict=True):
+    for x0, x1 in pairwise(xs):
         for k in range(len(arc) - 1):
             corners: list[Point] = [
                 (x0, ys[k], zs[k]),
@@ -112,6 +114,6 @@ def _sofa(mesh: Mesh, name: str, at: Point, turn_deg: float, width_m: float) -> 
     for n in range(count):
         left = -x + 0.16 + n * seat
         piece.box((left + 0.012, -0.25, 0.28 - SINK_M), (left + seat - 0.012, 0.43, 0.43), "cushion", name)
-        piece.box((left + 0.012, -0.28, 0.42), (left + seat - 0.012, -0.12, 0.8), "cushion", name)
-    piece.box((-x, -0.42, 0.28 - SINK_M), (x, -0.26, 0.74), "sofa", name)
+        piece.box((left + 0.016, -0.28, 0.42), (left + seat - 0.016, -0.12, 0.8), "cushion", name)
+    piece.box((-x, -0.416, 0.28 - SINK_M), (x, -0.26, 0.74), "sofa", name)
     mesh.add(piece, (at[0], at[1], at[2]), turn_deg, name)

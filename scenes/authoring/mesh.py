@@ -131,7 +131,7 @@ class Mesh:
             self.quad([(*p, z1) for p in strip], (0, 0, 1), material, object_name, solid)
 
     def add(self, piece: Mesh, at: Sequence[float] = (0, 0, 0), turn_deg: float = 0.0, object_name: str = "") -> None:
-        """Add a copy of `piece`, turned about z (counter-clockwise from above) and moved; renamed when a name is given."""
+        """Add a copy of `piece`, turned about z (counter-clockwise from above) and moved; a name renames it."""
         angle = np.radians(turn_deg)
         cos, sin = float(np.cos(angle)), float(np.sin(angle))
 
@@ -154,7 +154,7 @@ class Mesh:
         return sum(len(f.vertices) - 2 for f in self.faces)
 
     def check(self) -> None:
-        """Raise ValueError for a face without area, a quad that is not planar, or a solid that is open or inside out."""
+        """Raise ValueError for a face without area, a quad that is not planar, a solid that is open or inside out."""
         points = np.asarray(self.vertices)
         edges: dict[int, Counter[tuple[int, int]]] = {}
         volume: Counter[int] = Counter()

@@ -50,7 +50,7 @@ def build() -> Mesh:
 def _cubicles(mesh: Mesh) -> None:
     """Two clusters of workplaces around crossed partitions in the southern half."""
     for name, x, y, length in (("a", 3.5, 2.55, 4.2), ("b", 8.6, 2.35, 4.4)):
-        mesh.add(partition(length, 1.3), (x - length / 2, y, 0), 0, f"partition_{name}_1")
+        mesh.add(partition(length, 1.32), (x - length / 2, y, 0), 0, f"partition_{name}_1")
         mesh.add(partition(1.75, 1.3), (x, y + 0.025, 0), 90, f"partition_{name}_2")
         mesh.add(partition(1.75, 1.3), (x, y - 0.025, 0), -90, f"partition_{name}_3")
     desks = [  # piece, position of its centre, turn, chair position and turn (no chair: None)
@@ -70,7 +70,7 @@ def _cubicles(mesh: Mesh) -> None:
             mesh.add(pedestal_chair("fabric" if n % 3 else "fabric_warm"), (seat[0], seat[1], 0), seat[2], f"chair_{n}")
             at = (x + 0.25 * side, y - 0.16 * side, 0.73)
             mesh.add(monitor(), at, turn + (8 if n % 2 else -6), f"monitor_{n}")
-    for n, (x, y, turn) in enumerate(((5.02, 2.1, 0),), 1):
+    for n, (x, y, turn) in enumerate(((4.94, 2.1, 0),), 1):
         mesh.add(drawers(), (x, y, 0), turn, f"drawers_{n}")
 
 

@@ -22,7 +22,7 @@ class Shell:
     plan: (columns, rows, 2) inner corner points of a grid that fills the floor; the four borders of the grid are the
     walls (row 0 south, last row north, column 0 west, last column east), straight or curved. heights: z lines of the
     walls, from floor to ceiling. All inner faces follow this grid, so that floor, walls and ceiling share vertices.
-    holes: {(side, cell): ...}: side "south", "north", "west", "east" with cell (along, height), or "roof" (column, row).
+    holes: (side, cell): side "south", "north", "west" or "east" with cell (along, height), or "roof" (column, row).
     """
 
     plan: NDArray[np.float64]
