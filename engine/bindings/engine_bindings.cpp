@@ -1,0 +1,271 @@
+// Python's view of the engine: arrays in, arrays out, nothing computed here.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include "transom/build.h"
+#include "transom/engine.h"
+#include "transom/error.h"
+#include "transom/frame.h"
+#include "transom/gl_context.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace transom;
+
+namespace {
+
+template <typename T, typename... Shape>
+using In = nb::ndarray<const T, Shape..., nb::c_contig, nb::device::cpu>;
+
+// An array that owns `values` (moved, not copied) and shows them with the given shape.
+template <typename Scalar, typename Value>
+nb::ndarray<nb::numpy, Scalar> to_array(std::vector<Value>&& values, std::vector<std::size_t> shape) {
+  auto* kept = new std::vector<Value>(std::move(values));
+  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<Value>*>(p); });
+  return nb::ndarray<nb::numpy, Scalar>(kept->data(), shape.size(), shape.data(), owner);
+}
+
+template <typename Value, typename Array>
+std::vector<Value> to_vector(const Array& array) {
+  const auto* begin = reinterpret_cast<const Value*>(array.data());
+  return std::vector<Value>(begin, begin + array.size() * sizeof(*array.data()) / sizeof(Value));
+}
+
+nb::ndarray<nb::numpy, float> picture(std::vector<glm::vec3>&& pixels, int width, int height) {
+  return to_array<float>(std::move(pixels), {static_cast<std::size_t>(height), static_cast<std::size_t>(width), 3});
+}
+
+// The engine with the renderer that looks at it.
+struct Session {
+  Engine engine;
+  FrameRenderer renderer;
+  Session(SceneGeometry scene, const SkyBins& bins, SolveOptions options)
+      : engine(std::move(scene), bins, options), renderer(engine) {}
+};
+
+}  // namespace
+
+NB_MODULE(_engine, m) {
+  m.doc() = "Transom's light transport engine.";
+  nb::exception<InputError>(m, "EngineInputError", PyExc_ValueError);
+  nb::exception<GlError>(m, "GlError", PyExc_RuntimeError);
+
+  m.def("gl_backend", [] { return GlContext().name(); }, "Name of the OpenGL context that volumes would use.");
+  m.def("build_description", [] { return std::string(build_description()); }, "Compiler, flags and libraries of this build.");
+
+  nb::class_<OpeningGroup>(m, "OpeningGroup")
+      .def(nb::init<>())
+      .def_prop_rw(
+          "transmittance", [](const OpeningGroup& g) { return g.transmittance; },
+          [](OpeningGroup& g, In<float, nb::ndim<1>> table) { g.transmittance = to_vector<float>(table); })
+      .def_rw("diffuse_reflectance", &OpeningGroup::diffuse_reflectance);
+
+  nb::class_<SceneGeometry>(m, "SceneGeometry")
+      .def(
+          "__init__",
+          [](SceneGeometry* self, In<double, nb::shape<-1, 3>> vertices, In<int, nb::shape<-1, 4>> faces,
+             In<int, nb::ndim<1>> face_material, In<float, nb::shape<-1, 3>> corner_normals) {
+            new (self) SceneGeometry{};
+            self->vertices = to_vector<glm::dvec3>(vertices);
+            self->faces = to_vector<glm::ivec4>(faces);
+            self->face_material = to_vector<int>(face_material);
+            self->corner_normals = to_vector<glm::vec3>(corner_normals);
+          },
+          "vertices"_a, "faces"_a, "face_material"_a, "corner_normals"_a)
+      .def("add_material",
+           [](SceneGeometry& s, std::tuple<float, float, float> rho, std::tuple<float, float, float> luminance, bool smooth,
+              int opening) {
+             const auto [r, g, b] = rho;
+             const auto [lr, lg, lb] = luminance;
+             s.materials.push_back({{r, g, b}, {lr, lg, lb}, smooth, opening});
+           },
+           "reflectance"_a, "luminance"_a, "smooth"_a, "opening"_a)
+      .def("add_opening",
+           [](SceneGeometry& s, In<float, nb::ndim<1>> table, float diffuse_reflectance) {
+             s.openings.push_back({to_vector<float>(table), diffuse_reflectance});
+           },
+           "transmittance"_a, "diffuse_reflectance"_a)
+      .def("add_point_source",
+           [](SceneGeometry& s, std::tuple<double, double, double> position, std::tuple<float, float, float> intensity) {
+             const auto [x, y, z] = position;
+             const auto [r, g, b] = intensity;
+             s.point_sources.push_back({{x, y, z}, {r, g, b}});
+           },
+           "position"_a, "intensity"_a);
+
+  nb::class_<SkyBins>(m, "SkyBins")
+      .def(
+          "__init__",
+          [](SkyBins* self, In<float, nb::ndim<1>> edges, In<int, nb::ndim<1>> counts) {
+            new (self) SkyBins{to_vector<float>(edges), to_vector<int>(counts)};
+          },
+          "row_altitude_edges"_a, "row_counts"_a);
+
+  nb::class_<GatherSamples>(m, "GatherSamples")
+      .def(nb::init<int, int>(), "hemisphere"_a, "openings"_a)
+      .def_rw("hemisphere", &GatherSamples::hemisphere)
+      .def_rw("openings", &GatherSamples::openings);
+
+  nb::class_<SolveOptions>(m, "SolveOptions")
+      .def(nb::init<>())
+      .def_rw("maximum_edge_m", &SolveOptions::maximum_edge_m)
+      .def_rw("target_patch_count", &SolveOptions::target_patch_count)
+      .def_rw("elements_per_edge", &SolveOptions::elements_per_edge)
+      .def_rw("patch_samples", &SolveOptions::patch_samples)
+      .def_rw("node_samples", &SolveOptions::node_samples)
+      .def_rw("tolerance", &SolveOptions::tolerance)
+      .def_rw("seed", &SolveOptions::seed)
+      .def_rw("trace", &SolveOptions::trace);
+
+  nb::class_<TransferDefects>(m, "TransferDefects")
+      .def_ro("raw_reciprocity", &TransferDefects::raw_reciprocity)
+      .def_ro("raw_row_sum", &TransferDefects::raw_row_sum)
+      .def_ro("row_sum", &TransferDefects::row_sum)
+      .def_ro("reciprocity", &TransferDefects::reciprocity)
+      .def_ro("iterations", &TransferDefects::iterations);
+
+  nb::class_<SolveFacts>(m, "SolveFacts")
+      .def_ro("face_count", &SolveFacts::face_count)
+      .def_ro("patch_count", &SolveFacts::patch_count)
+      .def_ro("interior_patch_count", &SolveFacts::interior_patch_count)
+      .def_ro("node_count", &SolveFacts::node_count)
+      .def_ro("maximum_edge_m", &SolveFacts::maximum_edge_m)
+      .def_ro("leak_share", &SolveFacts::leak_share)
+      .def_ro("defects", &SolveFacts::defects);
+
+  nb::class_<Condition>(m, "Condition")
+      .def(
+          "__init__",
+          [](Condition* self, In<float, nb::ndim<1>> sky_luminance, std::tuple<float, float, float> sky_colour,
+             std::tuple<float, float, float> ground_luminance, In<float, nb::shape<-1, -1, 3>> sky_picture) {
+            new (self) Condition{};
+            self->sky_luminance = to_vector<float>(sky_luminance);
+            const auto [sr, sg, sb] = sky_colour;
+            self->sky_colour = {sr, sg, sb};
+            const auto [gr, gg, gb] = ground_luminance;
+            self->ground_luminance = {gr, gg, gb};
+            self->picture = to_vector<glm::vec3>(sky_picture);
+            self->picture_height = static_cast<int>(sky_picture.shape(0));
+            self->picture_width = static_cast<int>(sky_picture.shape(1));
+          },
+          "sky_luminance"_a, "sky_colour"_a, "ground_luminance"_a, "sky_picture"_a)
+      .def("add_beam",
+           [](Condition& c, std::tuple<float, float, float> direction, std::tuple<float, float, float> illuminance) {
+             const auto [x, y, z] = direction;
+             const auto [r, g, b] = illuminance;
+             c.beams.push_back({{x, y, z}, {r, g, b}});
+           },
+           "direction_to_source"_a, "normal_illuminance"_a);
+
+  nb::class_<View>(m, "View")
+      .def(
+          "__init__",
+          [](View* self, std::tuple<double, double, double> position, std::tuple<double, double, double> target,
+             std::tuple<double, double, double> up, double vertical_fov_rad, int width, int height) {
+            const auto at = [](const std::tuple<double, double, double>& t) {
+              return glm::dvec3(std::get<0>(t), std::get<1>(t), std::get<2>(t));
+            };
+            new (self) View{at(position), at(target), at(up), vertical_fov_rad, width, height};
+          },
+          "position"_a, "target"_a, "up"_a, "vertical_fov_rad"_a, "width"_a, "height"_a);
+
+  m.def(
+      "trace_primary",
+      [](const SceneGeometry& scene, const View& view) {
+        PrimaryHits hits = trace_primary(scene, view);
+        const std::vector<std::size_t> shape{static_cast<std::size_t>(view.height), static_cast<std::size_t>(view.width)};
+        return nb::make_tuple(to_array<int>(std::move(hits.face), shape),
+                              to_array<double>(std::move(hits.position), {shape[0], shape[1], 3}));
+      },
+      "scene"_a, "view"_a, "First face (height, width), -1 for none, and its point (height, width, 3) [m].");
+
+  nb::enum_<Visibility>(m, "Visibility").value("RAYS", Visibility::kRays).value("VOLUMES", Visibility::kVolumes);
+
+  nb::class_<Session>(m, "Engine")
+      .def(nb::init<SceneGeometry, const SkyBins&, SolveOptions>(), "scene"_a, "sky_bins"_a, "options"_a,
+           nb::call_guard<nb::gil_scoped_release>(), "Solves the scene: everything that depends on geometry alone.")
+      .def_prop_ro("facts", [](const Session& s) { return s.engine.facts(); })
+      .def("relight", [](Session& s, const Condition& c) { s.engine.relight(c); }, "condition"_a,
+           nb::call_guard<nb::gil_scoped_release>())
+      .def(
+          "render",
+          [](Session& s, const View& view, Visibility visibility, int edge_samples) {
+            Frame frame;
+            {
+              const nb::gil_scoped_release release;
+              frame = s.renderer.render(view, {visibility, edge_samples});
+            }
+            nb::dict result;
+            const int w = frame.width, h = frame.height;
+            result["radiance"] = picture(std::move(frame.radiance), w, h);
+            result["sun"] = picture(std::move(frame.sun), w, h);
+            result["sky"] = picture(std::move(frame.sky), w, h);
+            result["indirect"] = picture(std::move(frame.indirect), w, h);
+            result["emitted"] = picture(std::move(frame.emitted), w, h);
+            result["exterior"] = picture(std::move(frame.exterior), w, h);
+            result["edge_pixel_count"] = frame.edge_pixel_count;
+            return result;
+          },
+          "view"_a, "visibility"_a, "edge_samples"_a)
+      .def(
+          "illuminance",
+          [](const Session& s, In<double, nb::shape<-1, 3>> points, In<float, nb::shape<-1, 3>> normals, GatherSamples samples) {
+            std::vector<Irradiance> e;
+            {
+              const nb::gil_scoped_release release;
+              e = s.engine.illuminance(to_vector<glm::dvec3>(points), to_vector<glm::vec3>(normals), samples);
+            }
+            const std::size_t n = e.size();
+            return to_array<float>(std::move(e), {n, 3, 3});
+          },
+          "points"_a, "normals"_a, "samples"_a,
+          "Irradiance (N, 3, 3): rows direct, sky, indirect; columns RGB [lx].")
+      .def(
+          "audit",
+          [](const Session& s, int rays_per_opening) {
+            const EnergyAudit a = s.engine.audit(rays_per_opening);
+            nb::dict result;
+            const auto put = [&](const char* name, glm::dvec3 v) { result[name] = nb::make_tuple(v.x, v.y, v.z); };
+            put("in_sky", a.in_sky);
+            put("in_beams", a.in_beams);
+            put("in_reflected", a.in_reflected);
+            put("in_emitted", a.in_emitted);
+            put("absorbed", a.absorbed);
+            put("out", a.out);
+            return result;
+          },
+          "rays_per_opening"_a, "Flux balance of the interior [lm], linear RGB.")
+      .def_prop_ro("form_factors",
+                   [](const Session& s) {
+                     const SparseRows& f = s.engine.form_factors();
+                     std::vector<int> columns;
+                     std::vector<float> values;
+                     std::vector<long long> begin(f.begin.begin(), f.begin.end());
+                     for (const Share& share : f.entries) {
+                       columns.push_back(share.index);
+                       values.push_back(share.weight);
+                     }
+                     const std::size_t count = columns.size(), rows = begin.size();
+                     return nb::make_tuple(to_array<long long>(std::move(begin), {rows}),
+                                           to_array<int>(std::move(columns), {count}),
+                                           to_array<float>(std::move(values), {count}));
+                   },
+                   "Form factors between patches as compressed sparse rows: begin, column, value.")
+      .def_prop_ro("patch_areas",
+                   [](const Session& s) {
+                     std::vector<float> areas = s.engine.patch_areas();
+                     const std::size_t n = areas.size();
+                     return to_array<float>(std::move(areas), {n});
+                   },
+                   "Exposed area of each patch [m²].")
+      .def_prop_ro("sweeps", [](const Session& s) { return s.engine.lighting().sweeps; })
+      .def_prop_ro("trace", [](Session& s) {
+        nb::list events;
+        for (const TraceEvent& e : s.engine.trace().events()) events.append(nb::make_tuple(e.name, e.begin_s, e.end_s));
+        return events;
+      })
+      .def("clear_trace", [](Session& s) { s.engine.trace().clear(); });
+}

@@ -1,0 +1,49 @@
+/// @file Direct light of beams and point sources on the elements of patches, by area.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "transom/light_mesh.h"
+#include "transom/ray_scene.h"
+#include "transom/sky.h"
+
+namespace transom {
+
+/// Direct illuminance of one element [lx].
+struct LitElement {
+  int element;  ///< counted over all slots: slot * elements_per_slot + element
+  glm::vec3 illuminance;
+};
+
+/// Casts light from beams and point sources on patches and points. Openings on the way take their share.
+class DirectLight {
+ public:
+  DirectLight(const LightMesh& mesh, const RayScene& rays, const std::vector<PointSource>& sources);
+
+  /// Mean direct illuminance of the elements of `slots` that receive any. Stratified over each element; a patch that is
+  /// partly lit is sampled again `refinement` times as densely.
+  std::vector<LitElement> deposit(const std::vector<Beam>& beams, const std::vector<int>& slots, std::uint32_t seed) const;
+
+  /// Share of a beam that arrives at lifted points: 0 where something opaque intervenes, else the transmittance.
+  void beam_transmission(glm::vec3 direction_to_source, std::span<const glm::vec3> points, std::span<float> share) const;
+
+  /// Direct illuminance at a lifted point with a shading normal [lx].
+  glm::vec3 illuminance(const std::vector<Beam>& beams, glm::vec3 point, glm::vec3 normal) const;
+
+  /// The part of it that comes from point sources.
+  glm::vec3 point_source_illuminance(glm::vec3 point, glm::vec3 normal) const;
+
+ private:
+  struct LocalSource {
+    glm::vec3 position, intensity;
+  };
+  void deposit_on_slot(const std::vector<Beam>& beams, int slot, int samples, std::uint32_t seed, bool& is_mixed,
+                       std::vector<LitElement>& lit) const;
+
+  const LightMesh& mesh_;
+  const RayScene& rays_;
+  std::vector<LocalSource> sources_;
+};
+
+}  // namespace transom

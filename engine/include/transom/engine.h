@@ -1,0 +1,149 @@
+/// @file The engine: solve once for a geometry, relight for every condition, then look at it from anywhere.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "transom/deposit.h"
+#include "transom/gather.h"
+#include "transom/geometry.h"
+#include "transom/light_mesh.h"
+#include "transom/ray_scene.h"
+#include "transom/sky.h"
+#include "transom/trace.h"
+#include "transom/transfer.h"
+
+namespace transom {
+
+/// Settings of a solve. The defaults serve every scene.
+struct SolveOptions {
+  float maximum_edge_m = 0;      ///< of a patch; 0: from the target number of patches
+  int target_patch_count = 3000; ///< sides of cells that take part in the exchange of light, about
+  int elements_per_edge = 4;     ///< a patch has the square of it
+  GatherSamples patch_samples{512, 128};
+  GatherSamples node_samples{2048, 512};
+  double tolerance = 1e-6;       ///< flux in flight at which interreflection stops, relative
+  std::uint32_t seed = 1;
+  bool trace = false;
+};
+
+/// What the solve found and did, for the run bundle.
+struct SolveFacts {
+  int face_count = 0, patch_count = 0, interior_patch_count = 0, node_count = 0;
+  float maximum_edge_m = 0;
+  double leak_share = 0;  ///< of the hemisphere rays of interior patches, those that met nothing
+  TransferDefects defects;
+};
+
+/// Flux balance of the interior [lm], linear RGB. Interior: every side that light from the rooms' side of the openings, or
+/// from emitters, reaches without passing an opening.
+struct EnergyAudit {
+  glm::dvec3 in_sky{0};       ///< sky and ground light through the openings, sampled from the openings
+  glm::dvec3 in_beams{0};     ///< the same for beams
+  glm::dvec3 in_reflected{0}; ///< light that outdoor surfaces send through the openings
+  glm::dvec3 in_emitted{0};   ///< emitting surfaces and point sources
+  glm::dvec3 absorbed{0};     ///< by opaque surfaces
+  glm::dvec3 out{0};          ///< into the room side of openings: transmitted or absorbed there
+  glm::dvec3 in() const { return in_sky + in_beams + in_reflected + in_emitted; }
+};
+
+/// Irradiance split by where it comes from [lx].
+struct Irradiance {
+  glm::vec3 direct{0};    ///< beams and point sources
+  glm::vec3 sky{0};       ///< sky and ground, directly or through openings
+  glm::vec3 indirect{0};  ///< all surfaces: reflected and emitted
+};
+
+/// Light of the present condition.
+struct Lighting {
+  Condition condition;
+  std::vector<glm::vec3> node_sky, node_indirect;       ///< irradiance of each node [lx]
+  std::vector<glm::vec3> patch_irradiance;              ///< all light [lx]
+  std::vector<glm::vec3> patch_smooth_radiosity;        ///< M + rho (E - direct) [lm/m²]
+  std::vector<glm::vec3> element_direct;                ///< patch * elements_per_slot + element [lx]
+  int sweeps = 0;
+};
+
+class Engine {
+ public:
+  /// Solves: everything that depends on geometry and reflectance alone. Throws InputError for a scene that cannot be lit
+  /// rightly, such as a room whose wall is open.
+  Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions options);
+  ~Engine();
+
+  /// Relights for a condition: everything but the image.
+  void relight(Condition condition);
+
+  /// Irradiance at points (world coordinates [m]) with unit normals, under the present condition.
+  std::vector<Irradiance> illuminance(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
+                                      GatherSamples samples) const;
+
+  /// Flux balance under the present condition; `rays_per_opening` samples each opening triangle independently.
+  EnergyAudit audit(int rays_per_opening) const;
+
+  const SolveFacts& facts() const { return facts_; }
+  const Lighting& lighting() const { return lighting_; }
+  Trace& trace() { return trace_; }
+
+  // What rendering needs.
+  const SceneGeometry& scene() const { return scene_; }
+  const Faces& faces() const { return faces_; }
+  const RayScene& rays() const { return *rays_; }
+  const LightMesh& mesh() const { return *mesh_; }
+  const SkyBinIndex& sky_index() const { return *sky_index_; }
+  const DirectLight& direct_light() const { return *direct_light_; }
+  glm::vec3 reflectance(int face, Side side) const;
+
+  /// Sky and indirect irradiance at a point of a face, between its nodes. Zero where the side takes no part.
+  Irradiance interpolate(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const;
+
+  const SparseRows& form_factors() const { return form_factors_; }
+  const std::vector<float>& patch_areas() const { return patch_area_; }
+  const std::vector<int>& patch_slots() const { return slot_of_patch_; }
+
+ private:
+  void open_hollow_components();
+  void find_patches(const std::vector<int>& first_slots, std::vector<GatherRow>& rows);
+  std::vector<int> first_slots() const;
+  void mark_interior(const std::vector<GatherRow>& rows);
+  void check_closed(const std::vector<GatherRow>& rows);
+  void assemble_transfer(std::vector<GatherRow>& rows);
+  void gather_nodes();
+  void find_split_cells();
+  std::vector<Share> to_patches(const std::vector<Share>& elements) const;
+  glm::vec3 sky_light(const SparseRows& rows, std::size_t row) const;
+  glm::vec3 element_radiosity(int element) const;
+
+  SceneGeometry scene_;
+  SolveOptions options_;
+  Trace trace_;
+  SolveFacts facts_;
+  Faces faces_;
+  std::unique_ptr<RayScene> rays_;
+  std::unique_ptr<LightMesh> mesh_;
+  std::unique_ptr<SkyBinIndex> sky_index_;
+  std::unique_ptr<Gatherer> gatherer_;
+  std::unique_ptr<DirectLight> direct_light_;
+
+  // Patches: the slots that take part.
+  std::vector<int> patch_of_slot_;  // -1: takes no part
+  std::vector<int> slot_of_patch_;
+  std::vector<float> patch_area_;   // exposed part [m²]
+  std::vector<glm::vec3> patch_reflectance_, patch_emitted_;
+  std::vector<char> is_interior_;
+  SparseRows form_factors_, through_, patch_sky_;
+
+  // Nodes of every face side that takes part.
+  std::vector<int> first_node_;     // by 2 * face + side; -1: none
+  std::vector<char> node_is_exposed_;
+  SparseRows node_sky_, node_patches_;
+  std::vector<std::size_t> element_begin_;  // nodes that see an element: element_views_[begin[e] .. begin[e + 1])
+  std::vector<Share> element_views_;
+  std::vector<char> is_split_;      // by slot: something stands between the nodes of the cell
+
+  Lighting lighting_;
+};
+
+}  // namespace transom

@@ -1,0 +1,71 @@
+/// @file Pictures: primary rays, light between nodes, beams per pixel, edges averaged over the pixel.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "transom/engine.h"
+#include "transom/view.h"
+
+namespace transom {
+
+/// How beams are tested per pixel.
+enum class Visibility { kRays, kVolumes };
+
+/// Settings of a picture.
+struct FrameOptions {
+  Visibility visibility = Visibility::kRays;
+  int edge_samples = 4;  ///< per pixel and axis where an edge is found; 1: pixel centres only
+};
+
+/// A picture in cd/m² by what the light has done last. Their sum is `radiance`.
+struct Frame {
+  int width = 0, height = 0;
+  std::vector<glm::vec3> radiance;
+  std::vector<glm::vec3> sun;       ///< beams and point sources, reflected once
+  std::vector<glm::vec3> sky;       ///< sky and ground, reflected once
+  std::vector<glm::vec3> indirect;  ///< reflected more than once
+  std::vector<glm::vec3> emitted;   ///< emitters seen
+  std::vector<glm::vec3> exterior;  ///< what is seen through openings
+  int edge_pixel_count = 0;         ///< pixels that were supersampled
+};
+
+/// What pixel centres look at.
+struct PrimaryHits {
+  std::vector<int> face;              ///< first face, openings included; -1: nothing
+  std::vector<glm::dvec3> position;   ///< world [m]
+};
+
+/// Traces a ray through every pixel centre. Needs no solve.
+PrimaryHits trace_primary(const SceneGeometry& scene, const View& view);
+
+class ShadowVolumes;
+class GlContext;
+
+/// Renders the present lighting of an engine. Holds the GL context of the stencil method, made on first use; one thread.
+class FrameRenderer {
+ public:
+  explicit FrameRenderer(Engine& engine);
+  ~FrameRenderer();
+
+  Frame render(const View& view, FrameOptions options);
+
+ private:
+  struct Sample;
+  class BeamShare;
+  struct VolumeGroup {
+    int opening;
+    glm::vec3 normal;
+  };
+  void render_volumes(const View& view, int samples_per_axis, std::vector<std::vector<float>>& shares);
+  void trace_and_shade(const View& view, std::span<Sample> samples, const BeamShare* volumes) const;
+
+  Engine& engine_;
+  std::unique_ptr<GlContext> context_;
+  std::unique_ptr<ShadowVolumes> volumes_;
+  std::vector<VolumeGroup> volume_groups_;  // openings of one kind and orientation, as the stencil counts them
+};
+
+}  // namespace transom

@@ -1,0 +1,79 @@
+/// @file Where the light of a point or a patch comes from: shares of elements, sky bins, and openings looked through.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <utility>
+#include <vector>
+
+#include "transom/light_mesh.h"
+#include "transom/ray_scene.h"
+#include "transom/sky.h"
+
+namespace transom {
+
+/// Numbers of samples for one receiver.
+struct GatherSamples {
+  int hemisphere = 1024;  ///< rays over the hemisphere
+  int openings = 256;     ///< rays towards the openings in all
+};
+
+/// An index and a weight.
+struct Share {
+  int index;
+  float weight;
+};
+
+/// The light of one receiver as weights. Illuminance E = sum reached B + sum through B + sum sky L.
+struct GatherRow {
+  std::vector<Share> reached;  ///< elements seen without looking through an opening: form factors
+  std::vector<Share> through;  ///< elements seen through openings: form factors x transmittance
+  std::vector<Share> sky;      ///< sky bins (and ground): illuminance per luminance [lx per cd/m²]
+  float escaped = 0;           ///< share of the hemisphere that meets nothing: open sky
+  float exposure = 1;          ///< share of the receiver that does not lie inside a solid
+  float harmonic_distance = 0; ///< harmonic mean distance of what is seen [m]
+};
+
+/// Samples the surroundings of receivers. The row of a receiver depends on its seed alone.
+///
+/// Hemisphere: cosine-distributed rays to the first surface, opening or not. An opening's own reflection is thus part of
+/// `reached`. What is seen through the openings is sampled on the openings: solid-angle sampling of their triangles
+/// [Arvo 1995], each ray continued outdoors to an obstruction, the sky or the ground, times the transmittance of all
+/// openings on its way. A ray that meets another opening first is left to that opening.
+class Gatherer {
+ public:
+  Gatherer(const LightMesh& mesh, const RayScene& rays, const std::vector<Material>& materials,
+           const std::vector<OpeningGroup>& openings, const SkyBinIndex& sky);
+
+  /// Irradiance at a point [Cohen & Wallace 1993, eq. 2.54].
+  GatherRow gather_at_point(const Node& point, GatherSamples samples, std::uint32_t seed) const;
+
+  /// Mean irradiance over the exposed part of a patch.
+  GatherRow gather_over_patch(int slot, GatherSamples samples, std::uint32_t seed) const;
+
+ private:
+  struct OpeningTriangle {
+    glm::vec3 corner[3];
+    int face;
+    float area;
+  };
+  struct Origin {
+    glm::vec3 position, normal;
+  };
+  template <typename OriginOf>
+  void gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, GatherRow& row) const;
+  template <typename OriginOf>
+  void gather_openings(const Origin& middle, const OriginOf& origin_of, int count, std::uint32_t seed,
+                       GatherRow& row) const;
+
+  const LightMesh& mesh_;
+  const RayScene& rays_;
+  const std::vector<Material>& materials_;
+  const std::vector<OpeningGroup>& openings_;
+  const SkyBinIndex& sky_;
+  std::vector<OpeningTriangle> opening_triangles_;
+};
+
+/// Adds up the weights of equal indices and sorts by index.
+void merge_shares(std::vector<Share>& shares);
+
+}  // namespace transom

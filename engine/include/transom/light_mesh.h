@@ -1,0 +1,74 @@
+/// @file The subdivision of faces on which light is held: patches exchange it, elements resolve it, nodes show it.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "transom/geometry.h"
+#include "transom/ray_scene.h"
+
+namespace transom {
+
+/// A cell of a face's grid seen from one side. Its slot is 2 * cell + side, with cells counted over all faces.
+struct Slot {
+  int face;
+  Side side;
+  int cell;  ///< within the face's grid
+};
+
+/// A point at which irradiance is gathered: a corner of cells, on one side of a face, slightly inside the face.
+struct Node {
+  glm::vec3 position{0};  ///< lifted off the surface by Faces::ray_offset
+  glm::vec3 normal{0};    ///< shading normal of the side
+};
+
+/// Grids over all faces: cells no longer than a maximum edge, each split into elements_per_edge^2 elements.
+class LightMesh {
+ public:
+  LightMesh(const Faces& faces, float maximum_edge, int elements_per_edge);
+
+  const Faces& faces() const { return *faces_; }
+  int slot_count() const { return 2 * first_cell_.back(); }
+  int elements_per_slot() const { return elements_per_edge_ * elements_per_edge_; }
+  const Grid& grid(int face) const { return grids_[static_cast<std::size_t>(face)]; }
+
+  Slot slot(int index) const;
+  int slot_index(int face, Side side, int cell) const {
+    return 2 * (first_cell_[static_cast<std::size_t>(face)] + cell) + side;
+  }
+  int first_cell(int face) const { return first_cell_[static_cast<std::size_t>(face)]; }
+
+  /// Element under a hit, counted over all slots: slot * elements_per_slot + element.
+  int element_at(const Hit& hit) const;
+
+  /// Area of a cell [m²], and of an element of it [m²].
+  float cell_area(int face, int cell) const;
+  float element_area(int face, int cell, int element) const;
+
+  /// Parameters on the face of a point given in the unit square (quad) or unit triangle of an element, or of the cell.
+  glm::vec2 element_parameters(int face, int cell, int element, glm::vec2 local) const;
+  glm::vec2 cell_parameters(int face, int cell, glm::vec2 local) const;
+
+  /// Point of a face lifted off one side, from where rays may start.
+  glm::vec3 lifted_position(int face, Side side, glm::vec2 st) const;
+
+  /// Node number `node` of the face's grid, as seen from `side`.
+  Node node(int face, Side side, int node) const;
+
+  /// Maps two uniform numbers to the local parameters of a cell or element, uniform in area for congruent cells.
+  glm::vec2 sample_local(int face, glm::vec2 u) const;
+
+ private:
+  Grid element_grid(int face) const {
+    return {faces_->faces[static_cast<std::size_t>(face)].is_quad, elements_per_edge_, elements_per_edge_};
+  }
+  float area_between(int face, glm::vec2 a, glm::vec2 b, glm::vec2 c) const;
+
+  const Faces* faces_;
+  int elements_per_edge_;
+  std::vector<Grid> grids_;
+  std::vector<int> first_cell_;  // one more entry than faces: the last is the number of cells
+  std::vector<int> face_of_cell_;
+};
+
+}  // namespace transom

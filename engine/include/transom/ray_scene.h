@@ -1,0 +1,61 @@
+/// @file Rays against the scene, sixteen at a time (Embree 3 or 4).
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "transom/geometry.h"
+
+namespace transom {
+
+/// A ray or, with a finite t_far, a segment. Distances are in units of |direction|.
+struct Ray {
+  glm::vec3 origin{0};
+  glm::vec3 direction{0};
+  float t_near = 0;
+  float t_far = kInfinity;
+  static constexpr float kInfinity = 1e30f;
+};
+
+/// The first surface on a ray. face -1: nothing.
+struct Hit {
+  int face = -1;
+  Side side = 0;
+  float t = 0;
+  glm::vec2 st{0};  ///< parameters on the face
+};
+
+/// Acceleration structures over the opaque faces, the openings, and both.
+class RayScene {
+ public:
+  enum class What { kOpaque, kOpenings, kAll };
+
+  RayScene(const Faces& faces, const std::vector<Material>& materials, const std::vector<OpeningGroup>& openings);
+  ~RayScene();
+  RayScene(const RayScene&) = delete;
+  RayScene& operator=(const RayScene&) = delete;
+
+  /// First hit of every ray. `hits` has the size of `rays`.
+  void intersect(What what, std::span<const Ray> rays, std::span<Hit> hits) const;
+
+  /// 1 where something opaque (or of `what`) lies between t_near and t_far, else 0.
+  void occluded(What what, std::span<const Ray> rays, std::span<std::uint8_t> blocked) const;
+
+  /// Product of the transmittances of all openings between t_near and t_far. Opaque surfaces are not looked at.
+  float transmittance(const Ray& ray) const;
+
+  bool has_openings() const { return has_openings_; }
+
+ private:
+  struct Tree;
+  const Faces& faces_;
+  const std::vector<Material>& materials_;
+  const std::vector<OpeningGroup>& openings_;
+  std::unique_ptr<Tree> trees_[3];
+  bool has_openings_ = false;
+};
+
+}  // namespace transom

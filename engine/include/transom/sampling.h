@@ -1,0 +1,61 @@
+/// @file Points with low discrepancy, and their warps to hemispheres, triangles and spherical triangles.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+
+namespace transom {
+
+/// Mixes two integers into a well-spread seed (finaliser of SplitMix64).
+inline std::uint32_t hash_seed(std::uint64_t a, std::uint64_t b) {
+  std::uint64_t x = a * 0x9e3779b97f4a7c15ULL + b + 0x632be59bd9b4e019ULL;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
+  return static_cast<std::uint32_t>((x ^ (x >> 31)) >> 16);
+}
+
+/// Sobol's sequence in up to four dimensions (direction numbers of Joe & Kuo 2008), each dimension scrambled after
+/// Owen by hashing [Burley 2020, "Practical hash-based Owen scrambling"]. Every aligned block of 2^k points is a net.
+class SobolSequence {
+ public:
+  explicit SobolSequence(std::uint32_t seed) : seed_(seed) {}
+
+  /// Point number `index`; coordinates in [0, 1).
+  glm::vec2 point2(std::uint32_t index) const;
+  glm::vec4 point4(std::uint32_t index) const;
+
+ private:
+  std::uint32_t seed_;
+};
+
+/// Maps the unit square to the unit disc, preserving area and neighbourhood [Shirley & Chiu 1997].
+glm::vec2 sample_disc(glm::vec2 u);
+
+/// Direction in the hemisphere around +z with density cos(theta) / pi.
+glm::vec3 sample_cosine_hemisphere(glm::vec2 u);
+
+/// Right-handed orthonormal axes with `normal` as the third [Duff et al. 2017].
+glm::mat3 frame_from_normal(glm::vec3 normal);
+
+/// Barycentric coordinates (of the second and third corner), uniform in area.
+glm::vec2 sample_triangle(glm::vec2 u);
+
+/// The part of the unit sphere covered by a triangle seen from a point.
+class SphericalTriangle {
+ public:
+  /// Corners as unit directions from the point.
+  SphericalTriangle(glm::dvec3 a, glm::dvec3 b, glm::dvec3 c);
+
+  /// Solid angle [sr]; 0 for a degenerate triangle.
+  double solid_angle() const { return solid_angle_; }
+
+  /// Unit direction with density 1 / solid_angle [Arvo 1995].
+  glm::dvec3 sample(glm::dvec2 u) const;
+
+ private:
+  glm::dvec3 a_, b_, c_;
+  double alpha_ = 0, solid_angle_ = 0, cos_c_ = 0;
+};
+
+}  // namespace transom

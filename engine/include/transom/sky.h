@@ -1,0 +1,55 @@
+/// @file The sky dome in bins of Reinhart's subdivision, and the condition that a relighting is given.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <vector>
+
+namespace transom {
+
+/// Rows of equal altitude steps, each with equally wide bins; bin 0 of a row begins at the azimuth of +x and goes
+/// towards +y. The last row is the zenith cap. One more bin, the last, is the ground: everything below the horizon.
+struct SkyBins {
+  std::vector<float> row_altitude_edges;  ///< rows + 1, radians, from 0 to pi / 2
+  std::vector<int> row_counts;
+
+  int sky_count() const;
+  int ground() const { return sky_count(); }
+  int count() const { return sky_count() + 1; }
+};
+
+/// Finds the bin of a direction. Built once from SkyBins.
+class SkyBinIndex {
+ public:
+  explicit SkyBinIndex(const SkyBins& bins);
+  int count() const { return count_; }
+  /// Unit direction, z up.
+  int operator()(glm::vec3 direction) const;
+
+ private:
+  std::vector<float> row_sines_;  // sine of the lower edge of each row
+  std::vector<int> row_first_, row_counts_;
+  int count_ = 0;
+};
+
+/// Parallel light: unit direction towards its source, and normal illuminance outdoors as linear RGB [lx].
+struct Beam {
+  glm::vec3 direction_to_source{0, 0, 1};
+  glm::vec3 normal_illuminance{0};
+};
+
+/// Everything outdoors that can change from hour to hour.
+struct Condition {
+  std::vector<Beam> beams;
+  std::vector<float> sky_luminance;  ///< one a sky bin [cd/m²]
+  glm::vec3 sky_colour{1};           ///< RGB with Y = 1
+  glm::vec3 ground_luminance{0};     ///< [cd/m²]
+  /// What is seen of the sky and the ground: latitude-longitude picture, row 0 at the zenith, rows at pi j / (height - 1),
+  /// columns at 2 pi (i + 1/2) / width from +x towards +y. Empty: the bins are shown.
+  std::vector<glm::vec3> picture;
+  int picture_width = 0, picture_height = 0;
+
+  void validate(int sky_bin_count) const;
+  glm::vec3 seen(glm::vec3 direction, const SkyBinIndex& bins) const;
+};
+
+}  // namespace transom

@@ -1,0 +1,54 @@
+/// @file Interreflection between patches: form factors made reciprocal and closed, and the solution B = G (M + rho E).
+#pragma once
+
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "transom/gather.h"
+
+namespace transom {
+
+/// Compressed sparse rows.
+struct SparseRows {
+  std::vector<std::size_t> begin{0};  ///< rows + 1
+  std::vector<Share> entries;
+
+  std::size_t row_count() const { return begin.size() - 1; }
+  void append(const std::vector<Share>& row) {
+    entries.insert(entries.end(), row.begin(), row.end());
+    begin.push_back(entries.size());
+  }
+  /// Sum over a row of weight x values[index].
+  template <typename Value>
+  Value dot(std::size_t row, const std::vector<Value>& values) const {
+    Value sum(0);
+    for (std::size_t k = begin[row]; k < begin[row + 1]; ++k) sum += entries[k].weight * values[entries[k].index];
+    return sum;
+  }
+};
+
+/// How far sampled form factors were from what form factors must be, before and after mending.
+struct TransferDefects {
+  double raw_reciprocity = 0;  ///< sum |A_i F_ij - A_j F_ji| / sum A_i F_ij, as sampled
+  double raw_row_sum = 0;      ///< largest |sum_j F_ij - target_i| after making F reciprocal
+  double row_sum = 0;          ///< the same at the end
+  double reciprocity = 0;      ///< largest |A_i F_ij - A_j F_ji| / max(A_i, A_j) at the end
+  int iterations = 0;
+};
+
+/// Makes sampled form factors obey A_i F_ij = A_j F_ji and sum_j F_ij = target_i.
+///
+/// Both estimates of A_i F_ij are averaged by the inverse of their variance, then scaled symmetrically, d_i S_ij d_j, until the row sums hold
+/// [matrix balancing after Sinkhorn & Knopp 1967, by Newton's method: Knight & Ruiz 2013]. Rows without entries stay empty.
+TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<float>& areas,
+                                const std::vector<float>& row_sums);
+
+/// Irradiance of each patch in E = direct + (F + K) B with B = emitted + rho E, by Gauss-Seidel sweeps until the flux
+/// still in flight is below `tolerance` of all flux. Returns the number of sweeps; throws std::runtime_error when
+/// `maximum_sweeps` do not suffice.
+int solve_interreflection(const SparseRows& form_factors, const SparseRows& through,
+                          const std::vector<glm::vec3>& reflectance, const std::vector<glm::vec3>& emitted,
+                          const std::vector<glm::vec3>& direct, const std::vector<float>& areas, double tolerance,
+                          int maximum_sweeps, std::vector<glm::vec3>& irradiance);
+
+}  // namespace transom

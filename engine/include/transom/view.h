@@ -1,0 +1,32 @@
+/// @file A perspective camera.
+#pragma once
+
+#include <glm/glm.hpp>
+
+namespace transom {
+
+/// Pinhole camera in world coordinates [m]. The vertical field of view spans the height of the picture.
+struct View {
+  glm::dvec3 position{0};
+  glm::dvec3 target{0, 1, 0};
+  glm::dvec3 up{0, 0, 1};
+  double vertical_fov_rad = 1;
+  int width = 640;
+  int height = 480;
+
+  /// Throws InputError for a camera without direction or size.
+  void validate() const;
+};
+
+/// Rays through points of the picture, (0, 0) being its upper left corner and (width, height) its lower right one.
+class CameraRays {
+ public:
+  explicit CameraRays(const View& view);
+  glm::vec3 direction(glm::vec2 pixel) const;
+
+ private:
+  glm::dvec3 forward_, right_, down_;
+  double width_, height_;
+};
+
+}  // namespace transom

@@ -1,0 +1,75 @@
+#include <cmath>
+#include <numbers>
+
+#include "transom/engine.h"
+#include "transom/sampling.h"
+
+namespace transom {
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+constexpr std::uint32_t kAuditSeed = 0x5eed0a0d;
+
+}  // namespace
+
+// Flux in is sampled here from the openings outwards, with rays of its own: nothing of the solve is used but the radiosity
+// of outdoor surfaces.
+EnergyAudit Engine::audit(int rays_per_opening) const {
+  EnergyAudit audit;
+  const Condition& condition = lighting_.condition;
+  const int ground = sky_index_->count() - 1;
+  std::vector<Ray> rays(static_cast<std::size_t>(rays_per_opening));
+  std::vector<Hit> hits(rays.size());
+  std::vector<std::uint8_t> blocked(rays.size());
+  for (std::size_t f = 0; f < faces_.faces.size(); ++f) {
+    const Face& face = faces_.faces[f];
+    const int opening = scene_.materials[face.material].opening;
+    if (opening < 0) continue;
+    const OpeningGroup& group = scene_.openings[opening];
+    const SobolSequence points(hash_seed(options_.seed ^ kAuditSeed, f));
+    const float flux_share = face.area / static_cast<float>(rays_per_opening);
+    std::vector<glm::vec3> places(rays.size());
+    for (int i = 0; i < rays_per_opening; ++i) {
+      const glm::vec4 u = points.point4(static_cast<std::uint32_t>(i));
+      const glm::vec2 st = face.is_quad ? glm::vec2(u.z, u.w) : sample_triangle({u.z, u.w});
+      places[i] = mesh_->lifted_position(static_cast<int>(f), 0, st);
+      rays[i] = {places[i], frame_from_normal(face.normal) * sample_cosine_hemisphere({u.x, u.y})};
+    }
+    rays_->intersect(RayScene::What::kOpaque, rays, hits);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      if (hits[i].face >= 0 && faces_.is_inside_solid(hits[i].face, hits[i].side)) continue;
+      Ray beyond = rays[i];
+      if (hits[i].face >= 0) beyond.t_far = hits[i].t;
+      const float share = kPi * flux_share * group.transmittance_at(glm::dot(rays[i].direction, face.normal)) *
+                          rays_->transmittance(beyond);
+      if (hits[i].face >= 0) {
+        audit.in_reflected += glm::dvec3(share / kPi * element_radiosity(mesh_->element_at(hits[i])));
+      } else {
+        const int bin = (*sky_index_)(rays[i].direction);
+        audit.in_sky += glm::dvec3(share * (bin == ground ? condition.ground_luminance
+                                                          : condition.sky_luminance[bin] * condition.sky_colour));
+      }
+    }
+    for (const Beam& beam : condition.beams) {
+      const float cosine = glm::dot(face.normal, beam.direction_to_source);
+      if (cosine <= 0) continue;
+      for (std::size_t i = 0; i < rays.size(); ++i) rays[i] = {places[i], beam.direction_to_source};
+      rays_->occluded(RayScene::What::kOpaque, rays, blocked);
+      for (std::size_t i = 0; i < rays.size(); ++i)
+        if (!blocked[i])
+          audit.in_beams += glm::dvec3(beam.normal_illuminance) *
+                            static_cast<double>(flux_share * cosine * group.transmittance_at(cosine) * rays_->transmittance(rays[i]));
+    }
+  }
+  for (const PointSource& source : scene_.point_sources) audit.in_emitted += glm::dvec3(4 * kPi * source.intensity);
+  for (std::size_t p = 0; p < slot_of_patch_.size(); ++p) {
+    if (!is_interior_[p]) continue;
+    const glm::dvec3 lost(patch_area_[p] * (1.f - patch_reflectance_[p]) * lighting_.patch_irradiance[p]);
+    const Slot slot = mesh_->slot(slot_of_patch_[p]);
+    (scene_.materials[faces_.faces[slot.face].material].opening >= 0 ? audit.out : audit.absorbed) += lost;
+    audit.in_emitted += glm::dvec3(patch_area_[p] * patch_emitted_[p]);
+  }
+  return audit;
+}
+
+}  // namespace transom

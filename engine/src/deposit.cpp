@@ -1,0 +1,114 @@
+#include "transom/deposit.h"
+
+#include <cmath>
+
+#include "transom/parallel.h"
+#include "transom/sampling.h"
+
+namespace transom {
+namespace {
+
+constexpr int kSamplesPerElement = 4;        // to find out which patches are lit, and wholly or partly
+constexpr int kRefinedSamplesPerElement = 64;  // on patches that are partly lit
+constexpr std::size_t kGrain = 8;
+
+}  // namespace
+
+DirectLight::DirectLight(const LightMesh& mesh, const RayScene& rays, const std::vector<PointSource>& sources)
+    : mesh_(mesh), rays_(rays) {
+  for (const PointSource& source : sources)
+    sources_.push_back({glm::vec3(source.position - mesh.faces().origin), source.intensity});
+}
+
+void DirectLight::beam_transmission(glm::vec3 direction, std::span<const glm::vec3> points, std::span<float> share) const {
+  std::vector<Ray> rays(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) rays[i] = {points[i], direction};
+  std::vector<std::uint8_t> blocked(points.size());
+  rays_.occluded(RayScene::What::kOpaque, rays, blocked);
+  for (std::size_t i = 0; i < points.size(); ++i) share[i] = blocked[i] ? 0 : rays_.transmittance(rays[i]);
+}
+
+glm::vec3 DirectLight::point_source_illuminance(glm::vec3 point, glm::vec3 normal) const {
+  glm::vec3 sum(0);
+  for (const LocalSource& source : sources_) {
+    const glm::vec3 to_source = source.position - point;
+    const float distance2 = glm::dot(to_source, to_source), cosine = glm::dot(to_source, normal) / std::sqrt(distance2);
+    if (!(distance2 > 0) || cosine <= 0) continue;
+    const Ray ray{point, to_source, 0, 1};
+    std::uint8_t blocked = 0;
+    rays_.occluded(RayScene::What::kOpaque, {&ray, 1}, {&blocked, 1});
+    if (!blocked) sum += source.intensity * (cosine / distance2 * rays_.transmittance(ray));
+  }
+  return sum;
+}
+
+glm::vec3 DirectLight::illuminance(const std::vector<Beam>& beams, glm::vec3 point, glm::vec3 normal) const {
+  glm::vec3 sum = point_source_illuminance(point, normal);
+  for (const Beam& beam : beams) {
+    const float cosine = glm::dot(beam.direction_to_source, normal);
+    if (cosine <= 0) continue;
+    float share = 0;
+    beam_transmission(beam.direction_to_source, {&point, 1}, {&share, 1});
+    sum += beam.normal_illuminance * (cosine * share);
+  }
+  return sum;
+}
+
+void DirectLight::deposit_on_slot(const std::vector<Beam>& beams, int slot_index, int samples, std::uint32_t seed,
+                                  bool& is_mixed, std::vector<LitElement>& lit) const {
+  const Slot slot = mesh_.slot(slot_index);
+  const Face& face = mesh_.faces().faces[slot.face];
+  const glm::vec3 normal = slot.side == 0 ? face.normal : -face.normal;
+  const int element_count = mesh_.elements_per_slot();
+  std::vector<glm::vec3> points(static_cast<std::size_t>(element_count * samples));
+  for (int e = 0; e < element_count; ++e) {
+    const SobolSequence sequence(hash_seed(seed, static_cast<std::uint64_t>(slot_index * element_count + e)));
+    for (int i = 0; i < samples; ++i) {
+      const glm::vec2 local = mesh_.sample_local(slot.face, sequence.point2(static_cast<std::uint32_t>(i)));
+      const glm::vec2 st = mesh_.element_parameters(slot.face, slot.cell, e, local);
+      points[e * samples + i] = mesh_.lifted_position(slot.face, slot.side, st);
+    }
+  }
+  std::vector<glm::vec3> sum(static_cast<std::size_t>(element_count), glm::vec3(0));
+  std::size_t lit_count = 0, lightable_count = 0;
+  std::vector<float> share(points.size());
+  for (const Beam& beam : beams) {
+    const float cosine = glm::dot(beam.direction_to_source, normal);
+    if (cosine <= 0 || beam.normal_illuminance == glm::vec3(0)) continue;
+    beam_transmission(beam.direction_to_source, points, share);
+    lightable_count += points.size();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      lit_count += share[i] > 0;
+      sum[i / static_cast<std::size_t>(samples)] += beam.normal_illuminance * (cosine * share[i]);
+    }
+  }
+  if (!sources_.empty()) {
+    lightable_count += points.size();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const glm::vec3 e = point_source_illuminance(points[i], normal);
+      lit_count += e != glm::vec3(0);
+      sum[i / static_cast<std::size_t>(samples)] += e;
+    }
+  }
+  is_mixed = lit_count > 0 && lit_count < lightable_count;
+  for (int e = 0; e < element_count; ++e)
+    if (sum[e] != glm::vec3(0)) lit.push_back({slot_index * element_count + e, sum[e] / static_cast<float>(samples)});
+}
+
+std::vector<LitElement> DirectLight::deposit(const std::vector<Beam>& beams, const std::vector<int>& slots,
+                                             std::uint32_t seed) const {
+  std::vector<LitElement> lit;
+  if (beams.empty() && sources_.empty()) return lit;
+  std::vector<std::vector<LitElement>> by_slot(slots.size());
+  parallel_indices(slots.size(), kGrain, [&](std::size_t i) {
+    bool is_mixed = false;
+    deposit_on_slot(beams, slots[i], kSamplesPerElement, seed, is_mixed, by_slot[i]);
+    if (!is_mixed) return;
+    by_slot[i].clear();
+    deposit_on_slot(beams, slots[i], kRefinedSamplesPerElement, seed, is_mixed, by_slot[i]);
+  });
+  for (const std::vector<LitElement>& part : by_slot) lit.insert(lit.end(), part.begin(), part.end());
+  return lit;
+}
+
+}  // namespace transom

@@ -1,0 +1,449 @@
+#include "transom/engine.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <sstream>
+
+#include "transom/error.h"
+#include "transom/parallel.h"
+#include "transom/sampling.h"
+
+namespace transom {
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+constexpr std::size_t kGrain = 8;
+constexpr int kMaximumSweeps = 20000;
+constexpr double kLeakTolerance = 2e-4;      // share of interior rays that may slip through the rounding of edges
+constexpr float kHollowShare = 0.25f;        // of first rays on the inside of a solid: then it is a room
+constexpr int kFirstRays = 64;               // per patch on openings and emitters, to find hollow components
+constexpr float kExposedNode = 0.5f;         // a node counts when at least this share of its rays is outside solids
+
+// Streams of random numbers: each use has its own.
+enum Stream : std::uint64_t { kPatchStream = 1, kNodeStream, kBeamStream, kSensorStream, kAuditStream, kHollowStream };
+
+float automatic_edge(const Faces& faces, int target_patch_count) {
+  double area = 0;
+  for (std::size_t f = 0; f < faces.faces.size(); ++f)
+    area += faces.faces[f].area * (faces.is_inside_solid(static_cast<int>(f), 1) ? 0.6 : 1.0);
+  return static_cast<float>(std::sqrt(area / target_patch_count));
+}
+
+}  // namespace
+
+Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions options)
+    : scene_(std::move(scene)), options_(options) {
+  trace_.enable(options_.trace);
+  {
+    const TracePhase phase(trace_, "geometry");
+    faces_ = make_faces(scene_);
+    rays_ = std::make_unique<RayScene>(faces_, scene_.materials, scene_.openings);
+    sky_index_ = std::make_unique<SkyBinIndex>(sky_bins);
+    const float edge = options_.maximum_edge_m > 0 ? options_.maximum_edge_m
+                                                   : automatic_edge(faces_, options_.target_patch_count);
+    facts_.maximum_edge_m = edge;
+    mesh_ = std::make_unique<LightMesh>(faces_, edge, options_.elements_per_edge);
+    gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_);
+    direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources);
+    open_hollow_components();
+  }
+  std::vector<GatherRow> rows;
+  {
+    const TracePhase phase(trace_, "patches");
+    find_patches(first_slots(), rows);
+    mark_interior(rows);
+    check_closed(rows);
+  }
+  {
+    const TracePhase phase(trace_, "transfer");
+    assemble_transfer(rows);
+    rows.clear();
+  }
+  {
+    const TracePhase phase(trace_, "nodes");
+    gather_nodes();
+    find_split_cells();
+  }
+  facts_.face_count = static_cast<int>(faces_.faces.size());
+  facts_.patch_count = static_cast<int>(slot_of_patch_.size());
+}
+
+Engine::~Engine() = default;
+
+glm::vec3 Engine::reflectance(int face, Side side) const {
+  const Material& material = scene_.materials[faces_.faces[face].material];
+  if (material.opening < 0) return material.reflectance;
+  return side == 1 ? glm::vec3(scene_.openings[material.opening].diffuse_reflectance) : glm::vec3(0);
+}
+
+// The slots from which the search for patches starts: the room sides of openings, and emitters.
+std::vector<int> Engine::first_slots() const {
+  std::vector<int> slots;
+  for (std::size_t f = 0; f < faces_.faces.size(); ++f) {
+    const int face = static_cast<int>(f);
+    const Material& material = scene_.materials[faces_.faces[f].material];
+    const bool is_emitter = material.luminance != glm::vec3(0);
+    for (Side side = 0; side < 2; ++side) {
+      if (material.opening >= 0 ? side == 0 : (!is_emitter || faces_.is_inside_solid(face, side))) continue;
+      for (int cell = 0; cell < mesh_->grid(face).cell_count(); ++cell) slots.push_back(mesh_->slot_index(face, side, cell));
+    }
+  }
+  return slots;
+}
+
+// A closed surface that light starts inside of is a room, whatever way its faces look.
+void Engine::open_hollow_components() {
+  std::vector<Ray> rays;
+  std::vector<Hit> hits;
+  std::vector<int> count(faces_.component_is_solid.size());
+  const auto trace_and_open = [&] {
+    hits.resize(rays.size());
+    rays_->intersect(RayScene::What::kAll, rays, hits);
+    std::fill(count.begin(), count.end(), 0);
+    for (const Hit& hit : hits)
+      if (hit.face >= 0 && faces_.is_inside_solid(hit.face, hit.side)) ++count[faces_.faces[hit.face].component];
+    for (std::size_t c = 0; c < count.size(); ++c)
+      if (static_cast<float>(count[c]) > kHollowShare * static_cast<float>(rays.size())) faces_.component_is_solid[c] = 0;
+    rays.clear();
+  };
+  const std::vector<glm::vec3> axes{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (const PointSource& source : scene_.point_sources) {
+    const SobolSequence points(hash_seed(options_.seed, kHollowStream));
+    for (int i = 0; i < kFirstRays; ++i) {
+      const glm::vec2 u = points.point2(static_cast<std::uint32_t>(i));
+      const float z = 1 - 2 * u.x, r = std::sqrt(std::max(0.f, 1 - z * z));
+      rays.push_back({glm::vec3(source.position - faces_.origin),
+                      {r * std::cos(2 * kPi * u.y), r * std::sin(2 * kPi * u.y), z}});
+    }
+    trace_and_open();
+  }
+  for (std::size_t f = 0; f < faces_.faces.size(); ++f) {
+    const Face& face = faces_.faces[f];
+    const Material& material = scene_.materials[face.material];
+    const bool is_emitter = material.luminance != glm::vec3(0);
+    if (material.opening < 0 && !is_emitter) continue;
+    // Room sides of openings; both sides of emitters, since either may look into a room.
+    for (Side side = material.opening >= 0 ? 1 : 0; side < 2; ++side) {
+      if (is_emitter && side == 1 && faces_.component_is_solid[face.component] == 0) continue;
+      const SobolSequence points(hash_seed(options_.seed, kHollowStream + f));
+      for (int i = 0; i < kFirstRays; ++i) {
+        const glm::vec4 u = points.point4(static_cast<std::uint32_t>(i));
+        const glm::vec2 st = face.is_quad ? glm::vec2(u.z, u.w) : sample_triangle({u.z, u.w});
+        const glm::vec3 normal = side == 0 ? face.normal : -face.normal;
+        rays.push_back({mesh_->lifted_position(static_cast<int>(f), side, st),
+                        frame_from_normal(normal) * sample_cosine_hemisphere({u.x, u.y})});
+      }
+      trace_and_open();
+    }
+  }
+}
+
+// Rows wave by wave: what a patch sees becomes a patch in the next wave, until nothing new is seen.
+void Engine::find_patches(const std::vector<int>& first, std::vector<GatherRow>& rows) {
+  patch_of_slot_.assign(static_cast<std::size_t>(mesh_->slot_count()), -1);
+  const int per_slot = mesh_->elements_per_slot();
+  std::vector<int> wave = first;
+  for (std::size_t i = 0; i < scene_.point_sources.size(); ++i) {
+    const SobolSequence points(hash_seed(options_.seed, kHollowStream + i));
+    std::vector<Ray> rays;
+    for (int k = 0; k < options_.node_samples.hemisphere; ++k) {
+      const glm::vec2 u = points.point2(static_cast<std::uint32_t>(k));
+      const float z = 1 - 2 * u.x, r = std::sqrt(std::max(0.f, 1 - z * z));
+      rays.push_back({glm::vec3(scene_.point_sources[i].position - faces_.origin),
+                      {r * std::cos(2 * kPi * u.y), r * std::sin(2 * kPi * u.y), z}});
+    }
+    std::vector<Hit> hits(rays.size());
+    rays_->intersect(RayScene::What::kAll, rays, hits);
+    for (const Hit& hit : hits)
+      if (hit.face >= 0 && !faces_.is_inside_solid(hit.face, hit.side)) wave.push_back(mesh_->element_at(hit) / per_slot);
+  }
+  std::sort(wave.begin(), wave.end());
+  wave.erase(std::unique(wave.begin(), wave.end()), wave.end());
+
+  while (!wave.empty()) {
+    for (const int slot : wave) {
+      patch_of_slot_[slot] = static_cast<int>(slot_of_patch_.size());
+      slot_of_patch_.push_back(slot);
+    }
+    const std::size_t base = rows.size();
+    rows.resize(base + wave.size());
+    parallel_indices(wave.size(), kGrain, [&](std::size_t i) {
+      const std::uint32_t seed = hash_seed(options_.seed, hash_seed(kPatchStream, static_cast<std::uint64_t>(wave[i])));
+      rows[base + i] = gatherer_->gather_over_patch(wave[i], options_.patch_samples, seed);
+    });
+    std::vector<int> next;
+    for (std::size_t i = base; i < rows.size(); ++i)
+      for (const std::vector<Share>* shares : {&rows[i].reached, &rows[i].through})
+        for (const Share& share : *shares)
+          if (patch_of_slot_[share.index / per_slot] < 0) next.push_back(share.index / per_slot);
+    std::sort(next.begin(), next.end());
+    next.erase(std::unique(next.begin(), next.end()), next.end());
+    wave = std::move(next);
+  }
+}
+
+std::vector<Share> Engine::to_patches(const std::vector<Share>& elements) const {
+  std::vector<Share> patches;
+  patches.reserve(elements.size());
+  for (const Share& share : elements) {
+    const int patch = patch_of_slot_[share.index / mesh_->elements_per_slot()];
+    if (patch >= 0) patches.push_back({patch, share.weight});
+  }
+  merge_shares(patches);
+  return patches;
+}
+
+void Engine::mark_interior(const std::vector<GatherRow>& rows) {
+  is_interior_.assign(rows.size(), 0);
+  std::vector<int> stack;
+  const auto mark = [&](int patch) {
+    if (patch < 0 || is_interior_[patch]) return;
+    is_interior_[patch] = 1;
+    stack.push_back(patch);
+  };
+  for (const int slot : first_slots()) mark(patch_of_slot_[slot]);
+  if (!scene_.point_sources.empty())
+    for (std::size_t p = 0; p < rows.size(); ++p) mark(static_cast<int>(p));
+  while (!stack.empty()) {
+    const int patch = stack.back();
+    stack.pop_back();
+    for (const Share& share : rows[patch].reached) mark(patch_of_slot_[share.index / mesh_->elements_per_slot()]);
+  }
+  facts_.interior_patch_count = static_cast<int>(std::count(is_interior_.begin(), is_interior_.end(), 1));
+}
+
+void Engine::check_closed(const std::vector<GatherRow>& rows) {
+  double escaped = 0, total = 0, worst = 0;
+  std::size_t worst_patch = 0;
+  for (std::size_t p = 0; p < rows.size(); ++p) {
+    if (!is_interior_[p]) continue;
+    escaped += rows[p].escaped;
+    total += 1;
+    if (rows[p].escaped > worst) worst = rows[worst_patch = p].escaped;
+  }
+  facts_.leak_share = total > 0 ? escaped / total : 0;
+  if (facts_.leak_share <= kLeakTolerance) return;
+  const Slot slot = mesh_->slot(slot_of_patch_[worst_patch]);
+  const glm::dvec3 place =
+      faces_.origin + glm::dvec3(mesh_->lifted_position(slot.face, slot.side, mesh_->cell_parameters(slot.face, slot.cell, glm::vec2(1.f / 3))));
+  std::ostringstream text;
+  text.precision(3);
+  if (scene_.materials[faces_.faces[slot.face].material].opening >= 0)
+    text << "face " << faces_.faces[slot.face].source << ", an opening, looks the wrong way near (" << std::fixed << place.x << ", " << place.y << ", "
+         << place.z << ") m: " << 100 * worst << " % of the rays from its back leave the building. Turn its front outdoors";
+  else
+    text << "open wall: " << 100 * facts_.leak_share << " % of the rays in the room leave it without passing an opening, most near ("
+         << std::fixed << place.x << ", " << place.y << ", " << place.z << ") m, face " << faces_.faces[slot.face].source
+         << ". Close the gap, or declare it as an opening with glazing = \"none\"";
+  throw InputError(text.str());
+}
+
+void Engine::assemble_transfer(std::vector<GatherRow>& rows) {
+  const std::size_t n = rows.size();
+  patch_area_.resize(n);
+  patch_reflectance_.resize(n);
+  patch_emitted_.resize(n);
+  std::vector<float> row_sums(n);
+  for (std::size_t p = 0; p < n; ++p) {
+    const Slot slot = mesh_->slot(slot_of_patch_[p]);
+    patch_area_[p] = std::max(1e-6f, rows[p].exposure) * mesh_->cell_area(slot.face, slot.cell);
+    patch_reflectance_[p] = reflectance(slot.face, slot.side);
+    patch_emitted_[p] = kPi * scene_.materials[faces_.faces[slot.face].material].luminance;
+    row_sums[p] = is_interior_[p] ? 1.f : 1.f - rows[p].escaped;
+    form_factors_.append(to_patches(rows[p].reached));
+    through_.append(to_patches(rows[p].through));
+    patch_sky_.append(rows[p].sky);
+  }
+  facts_.defects = make_reciprocal(form_factors_, patch_area_, row_sums);
+}
+
+void Engine::gather_nodes() {
+  first_node_.assign(2 * faces_.faces.size(), -1);
+  std::vector<Node> nodes;
+  for (const int slot_index : slot_of_patch_) {
+    const Slot slot = mesh_->slot(slot_index);
+    int& first = first_node_[2 * slot.face + slot.side];
+    if (first >= 0 || reflectance(slot.face, slot.side) == glm::vec3(0)) continue;
+    first = static_cast<int>(nodes.size());
+    for (int k = 0; k < mesh_->grid(slot.face).node_count(); ++k) nodes.push_back(mesh_->node(slot.face, slot.side, k));
+  }
+  facts_.node_count = static_cast<int>(nodes.size());
+  std::vector<GatherRow> rows(nodes.size());
+  parallel_indices(nodes.size(), kGrain, [&](std::size_t i) {
+    rows[i] = gatherer_->gather_at_point(nodes[i], options_.node_samples, hash_seed(options_.seed, hash_seed(kNodeStream, i)));
+    rows[i].reached.insert(rows[i].reached.end(), rows[i].through.begin(), rows[i].through.end());
+  });
+
+  const int per_slot = mesh_->elements_per_slot();
+  element_begin_.assign(slot_of_patch_.size() * static_cast<std::size_t>(per_slot) + 1, 0);
+  const auto element_of = [&](int global) {
+    const int patch = patch_of_slot_[global / per_slot];
+    return patch < 0 ? -1 : patch * per_slot + global % per_slot;
+  };
+  node_is_exposed_.resize(nodes.size());
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    node_is_exposed_[i] = rows[i].exposure >= kExposedNode;
+    node_sky_.append(rows[i].sky);
+    node_patches_.append(to_patches(rows[i].reached));
+    for (const Share& share : rows[i].reached)
+      if (const int e = element_of(share.index); e >= 0) ++element_begin_[static_cast<std::size_t>(e) + 1];
+  }
+  std::partial_sum(element_begin_.begin(), element_begin_.end(), element_begin_.begin());
+  std::vector<std::size_t> next(element_begin_.begin(), element_begin_.end() - 1);
+  element_views_.resize(element_begin_.back());
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    for (const Share& share : rows[i].reached)
+      if (const int e = element_of(share.index); e >= 0) element_views_[next[e]++] = {static_cast<int>(i), share.weight};
+}
+
+// A cell is split when something stands between its nodes: there interpolation must ask which nodes a point sees.
+void Engine::find_split_cells() {
+  is_split_.assign(patch_of_slot_.size(), 0);
+  parallel_indices(slot_of_patch_.size(), kGrain, [&](std::size_t p) {
+    const Slot slot = mesh_->slot(slot_of_patch_[p]);
+    const int first = first_node_[2 * slot.face + slot.side];
+    if (first < 0) return;
+    const Grid& grid = mesh_->grid(slot.face);
+    const NodeWeights corners = grid.interpolate({slot.cell, {0.3f, 0.3f}});
+    std::vector<glm::vec3> places;
+    for (int k = 0; k < corners.count; ++k)
+      places.push_back(mesh_->node(slot.face, slot.side, corners.node[k]).position);
+    std::vector<Ray> rays;
+    for (std::size_t a = 0; a < places.size(); ++a)
+      for (std::size_t b = a + 1; b < places.size(); ++b) rays.push_back({places[a], places[b] - places[a], 0, 1});
+    std::vector<std::uint8_t> blocked(rays.size());
+    rays_->occluded(RayScene::What::kOpaque, rays, blocked);
+    bool split = std::find(blocked.begin(), blocked.end(), 1) != blocked.end();
+    for (int k = 0; k < corners.count; ++k) split |= !node_is_exposed_[first + corners.node[k]];
+    is_split_[slot_of_patch_[p]] = split;
+  });
+}
+
+glm::vec3 Engine::sky_light(const SparseRows& rows, std::size_t row) const {
+  const int ground = sky_index_->count() - 1;
+  float sky = 0;
+  glm::vec3 sum(0);
+  for (std::size_t k = rows.begin[row]; k < rows.begin[row + 1]; ++k) {
+    const Share& share = rows.entries[k];
+    if (share.index == ground)
+      sum += share.weight * lighting_.condition.ground_luminance;
+    else
+      sky += share.weight * lighting_.condition.sky_luminance[share.index];
+  }
+  return sum + sky * lighting_.condition.sky_colour;
+}
+
+void Engine::relight(Condition condition) {
+  condition.validate(sky_index_->count() - 1);
+  lighting_.condition = std::move(condition);
+  const std::size_t n = slot_of_patch_.size();
+  const int per_slot = mesh_->elements_per_slot();
+  std::vector<LitElement> lit;
+  {
+    const TracePhase phase(trace_, "beams");
+    lit = direct_light_->deposit(lighting_.condition.beams, slot_of_patch_, hash_seed(options_.seed, kBeamStream));
+  }
+  std::vector<glm::vec3> sky(n), from_beams(n, glm::vec3(0)), direct(n);
+  {
+    const TracePhase phase(trace_, "sky");
+    parallel_indices(n, 64, [&](std::size_t p) { sky[p] = sky_light(patch_sky_, p); });
+  }
+  {
+    const TracePhase phase(trace_, "interreflection");
+    lighting_.element_direct.assign(n * static_cast<std::size_t>(per_slot), glm::vec3(0));
+    for (LitElement& e : lit) {
+      const int patch = patch_of_slot_[e.element / per_slot];
+      const Slot slot = mesh_->slot(e.element / per_slot);
+      from_beams[patch] += e.illuminance * (mesh_->element_area(slot.face, slot.cell, e.element % per_slot) / patch_area_[patch]);
+      e.element = patch * per_slot + e.element % per_slot;
+      lighting_.element_direct[e.element] = e.illuminance;
+    }
+    for (std::size_t p = 0; p < n; ++p) direct[p] = sky[p] + from_beams[p];
+    lighting_.patch_irradiance = direct;
+    lighting_.sweeps = solve_interreflection(form_factors_, through_, patch_reflectance_, patch_emitted_, direct, patch_area_,
+                                             options_.tolerance, kMaximumSweeps, lighting_.patch_irradiance);
+    lighting_.patch_smooth_radiosity.resize(n);
+    for (std::size_t p = 0; p < n; ++p)
+      lighting_.patch_smooth_radiosity[p] =
+          patch_emitted_[p] + patch_reflectance_[p] * (lighting_.patch_irradiance[p] - from_beams[p]);
+  }
+  {
+    const TracePhase phase(trace_, "gather");
+    const std::size_t node_count = node_sky_.row_count();
+    lighting_.node_sky.resize(node_count);
+    lighting_.node_indirect.resize(node_count);
+    parallel_indices(node_count, 64, [&](std::size_t i) {
+      lighting_.node_sky[i] = sky_light(node_sky_, i);
+      lighting_.node_indirect[i] = node_patches_.dot(i, lighting_.patch_smooth_radiosity);
+    });
+    for (const LitElement& e : lit) {
+      const glm::vec3 radiosity = patch_reflectance_[e.element / per_slot] * e.illuminance;
+      for (std::size_t k = element_begin_[e.element]; k < element_begin_[e.element + 1]; ++k)
+        lighting_.node_indirect[element_views_[k].index] += element_views_[k].weight * radiosity;
+    }
+  }
+}
+
+glm::vec3 Engine::element_radiosity(int element) const {
+  const int per_slot = mesh_->elements_per_slot();
+  const int patch = patch_of_slot_[element / per_slot];
+  if (patch < 0) return glm::vec3(0);
+  return lighting_.patch_smooth_radiosity[patch] +
+         patch_reflectance_[patch] * lighting_.element_direct[patch * per_slot + element % per_slot];
+}
+
+std::vector<Irradiance> Engine::illuminance(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
+                                            GatherSamples samples) const {
+  std::vector<Irradiance> result(points.size());
+  parallel_indices(points.size(), 1, [&](std::size_t i) {
+    const glm::vec3 normal = glm::normalize(normals[i]);
+    const Node node{glm::vec3(points[i] - faces_.origin) + faces_.ray_offset() * normal, normal};
+    const GatherRow row = gatherer_->gather_at_point(node, samples, hash_seed(options_.seed, hash_seed(kSensorStream, i)));
+    SparseRows sky;
+    sky.append(row.sky);
+    result[i].direct = direct_light_->illuminance(lighting_.condition.beams, node.position, normal);
+    result[i].sky = sky_light(sky, 0);
+    for (const std::vector<Share>* shares : {&row.reached, &row.through})
+      for (const Share& share : *shares) result[i].indirect += share.weight * element_radiosity(share.index);
+  });
+  return result;
+}
+
+Irradiance Engine::interpolate(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const {
+  const int first = first_node_[2 * face + side];
+  if (first < 0) return {};
+  const CellPoint point = mesh_->grid(face).locate(st);
+  NodeWeights nodes = mesh_->grid(face).interpolate(point);
+  if (is_split_[mesh_->slot_index(face, side, point.cell)]) {
+    Ray rays[4];
+    std::uint8_t blocked[4];
+    for (int k = 0; k < nodes.count; ++k)
+      rays[k] = {lifted_point, mesh_->node(face, side, nodes.node[k]).position - lifted_point, 0, 1};
+    rays_->occluded(RayScene::What::kOpaque, {rays, static_cast<std::size_t>(nodes.count)},
+                    {blocked, static_cast<std::size_t>(nodes.count)});
+    float sum = 0;
+    for (int k = 0; k < nodes.count; ++k) {
+      if (blocked[k] || !node_is_exposed_[first + nodes.node[k]]) nodes.weight[k] = 0;
+      sum += nodes.weight[k];
+    }
+    if (sum < 1e-3f) {
+      const int patch = patch_of_slot_[mesh_->slot_index(face, side, point.cell)];
+      if (patch < 0) return {};
+      SparseRows const& sky = patch_sky_;
+      const glm::vec3 from_sky = sky_light(sky, static_cast<std::size_t>(patch));
+      const glm::vec3 smooth = form_factors_.dot(static_cast<std::size_t>(patch), lighting_.patch_smooth_radiosity);
+      return {glm::vec3(0), from_sky, smooth};
+    }
+    for (int k = 0; k < nodes.count; ++k) nodes.weight[k] /= sum;
+  }
+  Irradiance result;
+  for (int k = 0; k < nodes.count; ++k) {
+    result.sky += nodes.weight[k] * lighting_.node_sky[first + nodes.node[k]];
+    result.indirect += nodes.weight[k] * lighting_.node_indirect[first + nodes.node[k]];
+  }
+  return result;
+}
+
+}  // namespace transom

@@ -1,0 +1,209 @@
+#include "transom/gather.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "transom/sampling.h"
+
+namespace transom {
+namespace {
+
+constexpr int kBlock = 64;                     // rays traced together
+constexpr double kSmallSolidAngle = 2e-3;      // below it a triangle is sampled by area [sr]
+constexpr int kMinimumRaysPerTriangle = 4;     // towards an opening triangle above the horizon
+constexpr float kPi = std::numbers::pi_v<float>;
+
+}  // namespace
+
+void merge_shares(std::vector<Share>& shares) {
+  std::sort(shares.begin(), shares.end(), [](const Share& a, const Share& b) { return a.index < b.index; });
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    if (kept > 0 && shares[kept - 1].index == shares[i].index)
+      shares[kept - 1].weight += shares[i].weight;
+    else
+      shares[kept++] = shares[i];
+  }
+  shares.resize(kept);
+}
+
+Gatherer::Gatherer(const LightMesh& mesh, const RayScene& rays, const std::vector<Material>& materials,
+                   const std::vector<OpeningGroup>& openings, const SkyBinIndex& sky)
+    : mesh_(mesh), rays_(rays), materials_(materials), openings_(openings), sky_(sky) {
+  const std::vector<Face>& faces = mesh.faces().faces;
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    if (materials[faces[f].material].opening < 0) continue;
+    for (int part = 0; part < (faces[f].is_quad ? 2 : 1); ++part) {
+      const glm::vec3 a = faces[f].corner[0], b = faces[f].corner[1 + part], c = faces[f].corner[2 + part];
+      opening_triangles_.push_back({{a, b, c}, static_cast<int>(f), 0.5f * glm::length(glm::cross(b - a, c - a))});
+    }
+  }
+}
+
+template <typename OriginOf>
+void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, GatherRow& row) const {
+  const SobolSequence points(seed);
+  Ray rays[kBlock];
+  Hit hits[kBlock];
+  int buried = 0, escaped = 0;
+  double inverse_distance = 0;
+  std::vector<Share>& reached = row.reached;
+  reached.reserve(static_cast<std::size_t>(count));
+  std::vector<int> open_bins;
+  for (int begin = 0; begin < count; begin += kBlock) {
+    const int size = std::min(kBlock, count - begin);
+    for (int i = 0; i < size; ++i) {
+      const glm::vec4 u = points.point4(static_cast<std::uint32_t>(begin + i));
+      const Origin origin = origin_of(glm::vec2(u.z, u.w));
+      rays[i] = {origin.position, frame_from_normal(origin.normal) * sample_cosine_hemisphere({u.x, u.y})};
+    }
+    rays_.intersect(RayScene::What::kAll, {rays, static_cast<std::size_t>(size)}, {hits, static_cast<std::size_t>(size)});
+    for (int i = 0; i < size; ++i) {
+      if (hits[i].face < 0) {
+        ++escaped;
+        open_bins.push_back(sky_(rays[i].direction));
+      } else if (mesh_.faces().is_inside_solid(hits[i].face, hits[i].side)) {
+        ++buried;
+      } else {
+        reached.push_back({mesh_.element_at(hits[i]), 1});
+        inverse_distance += 1 / std::max(hits[i].t, mesh_.faces().ray_offset());
+      }
+    }
+  }
+  const int exposed = count - buried;
+  row.exposure = static_cast<float>(exposed) / static_cast<float>(count);
+  if (exposed == 0) return;
+  const float share = 1 / static_cast<float>(exposed);
+  merge_shares(reached);
+  for (Share& s : reached) s.weight *= share;
+  for (const int bin : open_bins) row.sky.push_back({bin, kPi * share});
+  row.escaped = static_cast<float>(escaped) * share;
+  row.harmonic_distance = inverse_distance > 0 ? static_cast<float>(exposed / inverse_distance) : Ray::kInfinity;
+}
+
+template <typename OriginOf>
+void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, int count, std::uint32_t seed,
+                               GatherRow& row) const {
+  if (opening_triangles_.empty() || row.exposure == 0) return;
+  const auto triangle_from = [](const OpeningTriangle& t, glm::vec3 p) {
+    return SphericalTriangle(glm::normalize(glm::dvec3(t.corner[0] - p)), glm::normalize(glm::dvec3(t.corner[1] - p)),
+                             glm::normalize(glm::dvec3(t.corner[2] - p)));
+  };
+  // Rays in proportion to the solid angle, with a floor, and none for what lies behind the receiver.
+  std::vector<double> importance(opening_triangles_.size(), 0.0);
+  double total = 0;
+  for (std::size_t k = 0; k < opening_triangles_.size(); ++k) {
+    const OpeningTriangle& t = opening_triangles_[k];
+    float highest = -1;
+    for (const glm::vec3& corner : t.corner) highest = std::max(highest, glm::dot(corner - middle.position, middle.normal));
+    if (highest <= 0) continue;
+    importance[k] = triangle_from(t, middle.position).solid_angle() + 1e-9;
+    total += importance[k];
+  }
+  if (total == 0) return;
+
+  struct Candidate {
+    float weight;  // cos(theta) x solid angle / rays [sr]
+    int face;
+  };
+  std::vector<Ray> segments;
+  std::vector<Candidate> candidates;
+  for (std::size_t k = 0; k < opening_triangles_.size(); ++k) {
+    if (importance[k] == 0) continue;
+    const OpeningTriangle& t = opening_triangles_[k];
+    const int n = std::max(kMinimumRaysPerTriangle, static_cast<int>(std::lround(importance[k] / total * count)));
+    const SobolSequence points(hash_seed(seed, k + 1));
+    const glm::vec3 normal = mesh_.faces().faces[t.face].normal;
+    for (int i = 0; i < n; ++i) {
+      const glm::vec4 u = points.point4(static_cast<std::uint32_t>(i));
+      const Origin origin = origin_of(glm::vec2(u.z, u.w));
+      const SphericalTriangle seen = triangle_from(t, origin.position);
+      glm::vec3 to_opening;
+      float solid_angle;
+      if (seen.solid_angle() > kSmallSolidAngle) {
+        const glm::vec3 direction(seen.sample({u.x, u.y}));
+        const float facing = glm::dot(direction, normal);
+        if (std::abs(facing) < 1e-6f) continue;
+        to_opening = direction * (glm::dot(t.corner[0] - origin.position, normal) / facing);
+        solid_angle = static_cast<float>(seen.solid_angle());
+      } else {
+        const glm::vec2 b = sample_triangle({u.x, u.y});
+        to_opening = t.corner[0] + b.x * (t.corner[1] - t.corner[0]) + b.y * (t.corner[2] - t.corner[0]) - origin.position;
+        const float distance2 = glm::dot(to_opening, to_opening);
+        if (distance2 == 0) continue;
+        solid_angle = t.area * std::abs(glm::dot(to_opening, normal)) / (distance2 * std::sqrt(distance2));
+      }
+      const float distance = glm::length(to_opening);
+      if (!(distance > 0)) continue;
+      const float cosine = glm::dot(to_opening, origin.normal) / distance;
+      if (cosine <= 0) continue;
+      segments.push_back({origin.position, to_opening / distance, 0, distance - mesh_.faces().ray_offset()});
+      candidates.push_back({cosine * solid_angle / static_cast<float>(n), t.face});
+    }
+  }
+  if (segments.empty()) return;
+  std::vector<std::uint8_t> blocked(segments.size());
+  rays_.occluded(RayScene::What::kAll, segments, blocked);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    if (blocked[i] || segments[i].t_far <= 0) continue;
+    segments[kept] = segments[i];
+    candidates[kept++] = candidates[i];
+  }
+  segments.resize(kept);
+  candidates.resize(kept);
+
+  // Beyond the opening: an obstruction, the sky or the ground. Further openings on the way take their share.
+  const float offset = mesh_.faces().ray_offset();
+  for (Ray& ray : segments) {
+    ray.t_near = ray.t_far;
+    ray.t_far = Ray::kInfinity;
+  }
+  std::vector<Hit> hits(kept);
+  rays_.intersect(RayScene::What::kOpaque, segments, hits);
+  const float scale = 1 / row.exposure;
+  for (std::size_t i = 0; i < kept; ++i) {
+    const bool is_outdoors = hits[i].face < 0;
+    if (!is_outdoors && mesh_.faces().is_inside_solid(hits[i].face, hits[i].side)) continue;
+    Ray crossing = segments[i];
+    crossing.t_far = is_outdoors ? Ray::kInfinity : hits[i].t - offset;
+    const float weight = scale * candidates[i].weight * rays_.transmittance(crossing);
+    if (weight <= 0) continue;
+    if (is_outdoors)
+      row.sky.push_back({sky_(segments[i].direction), weight});
+    else
+      row.through.push_back({mesh_.element_at(hits[i]), weight / kPi});
+  }
+}
+
+GatherRow Gatherer::gather_at_point(const Node& point, GatherSamples samples, std::uint32_t seed) const {
+  GatherRow row;
+  const Origin origin{point.position, point.normal};
+  const auto origin_of = [&](glm::vec2) { return origin; };
+  gather_hemisphere(origin_of, samples.hemisphere, seed, row);
+  gather_openings(origin, origin_of, samples.openings, seed, row);
+  merge_shares(row.through);
+  merge_shares(row.sky);
+  return row;
+}
+
+GatherRow Gatherer::gather_over_patch(int slot_index, GatherSamples samples, std::uint32_t seed) const {
+  const Slot slot = mesh_.slot(slot_index);
+  const Face& face = mesh_.faces().faces[slot.face];
+  const glm::vec3 normal = slot.side == 0 ? face.normal : -face.normal;
+  const auto origin_of = [&](glm::vec2 u) {
+    const glm::vec2 st = mesh_.cell_parameters(slot.face, slot.cell, mesh_.sample_local(slot.face, u));
+    return Origin{mesh_.lifted_position(slot.face, slot.side, st), normal};
+  };
+  GatherRow row;
+  gather_hemisphere(origin_of, samples.hemisphere, seed, row);
+  const glm::vec2 middle = mesh_.grid(slot.face).is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3);
+  const Origin centre{mesh_.lifted_position(slot.face, slot.side, mesh_.cell_parameters(slot.face, slot.cell, middle)), normal};
+  gather_openings(centre, origin_of, samples.openings, seed, row);
+  merge_shares(row.through);
+  merge_shares(row.sky);
+  return row;
+}
+
+}  // namespace transom

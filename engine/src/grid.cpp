@@ -1,0 +1,79 @@
+#include "transom/grid.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace transom {
+
+CellPoint Grid::locate(glm::vec2 st) const {
+  st = glm::clamp(st, 0.f, 1.f);
+  if (is_quad) {
+    const glm::vec2 scaled = st * glm::vec2(u_count, v_count);
+    const int i = std::min(static_cast<int>(scaled.x), u_count - 1);
+    const int j = std::min(static_cast<int>(scaled.y), v_count - 1);
+    return {j * u_count + i, scaled - glm::vec2(i, j)};
+  }
+  const int n = u_count;
+  if (st.x + st.y > 1) st /= st.x + st.y;
+  const glm::vec2 scaled = st * static_cast<float>(n);
+  const int j = std::min(static_cast<int>(scaled.y), n - 1);
+  const int i = std::min(static_cast<int>(scaled.x), n - 1 - j);
+  glm::vec2 local = glm::clamp(scaled - glm::vec2(i, j), 0.f, 1.f);
+  const bool upper = local.x + local.y > 1 && i + j < n - 1;
+  if (upper) local = 1.f - local;
+  if (local.x + local.y > 1) local /= local.x + local.y;
+  return {2 * n * j - j * j + 2 * i + (upper ? 1 : 0), local};
+}
+
+Grid::TriangleCell Grid::triangle_cell(int cell) const {
+  const int n = u_count;
+  // Row j begins at 2 n j - j^2: the largest j whose row begins at or before `cell`.
+  int j = static_cast<int>(static_cast<float>(n) - std::sqrt(std::max(0.f, static_cast<float>(n * n - cell))));
+  j = std::clamp(j, 0, n - 1);
+  while (j + 1 < n && 2 * n * (j + 1) - (j + 1) * (j + 1) <= cell) ++j;
+  while (2 * n * j - j * j > cell) --j;
+  const int rest = cell - (2 * n * j - j * j);
+  return {rest / 2, j, rest % 2 == 1};
+}
+
+glm::vec2 Grid::parameters(CellPoint point) const {
+  if (is_quad) {
+    const int i = point.cell % u_count, j = point.cell / u_count;
+    return (glm::vec2(i, j) + point.local) / glm::vec2(u_count, v_count);
+  }
+  const TriangleCell cell = triangle_cell(point.cell);
+  const glm::vec2 local = cell.upper ? 1.f - point.local : point.local;
+  return (glm::vec2(cell.i, cell.j) + local) / static_cast<float>(u_count);
+}
+
+glm::vec2 Grid::node_parameters(int node) const {
+  if (is_quad) {
+    const int i = node % (u_count + 1), j = node / (u_count + 1);
+    return glm::vec2(i, j) / glm::vec2(u_count, v_count);
+  }
+  int j = 0;
+  while (triangle_node(0, j + 1) <= node && j < u_count) ++j;
+  return glm::vec2(node - triangle_node(0, j), j) / static_cast<float>(u_count);
+}
+
+NodeWeights Grid::interpolate(CellPoint point) const {
+  const glm::vec2 p = point.local;
+  if (is_quad) {
+    const int i = point.cell % u_count, j = point.cell / u_count;
+    const int first = j * (u_count + 1) + i, next_row = first + u_count + 1;
+    return {{first, first + 1, next_row + 1, next_row},
+            {(1 - p.x) * (1 - p.y), p.x * (1 - p.y), p.x * p.y, (1 - p.x) * p.y},
+            4};
+  }
+  const TriangleCell cell = triangle_cell(point.cell);
+  const float first_weight = std::max(0.f, 1 - p.x - p.y);
+  if (!cell.upper)
+    return {{triangle_node(cell.i, cell.j), triangle_node(cell.i + 1, cell.j), triangle_node(cell.i, cell.j + 1), 0},
+            {first_weight, p.x, p.y, 0},
+            3};
+  return {{triangle_node(cell.i + 1, cell.j + 1), triangle_node(cell.i, cell.j + 1), triangle_node(cell.i + 1, cell.j), 0},
+          {first_weight, p.x, p.y, 0},
+          3};
+}
+
+}  // namespace transom

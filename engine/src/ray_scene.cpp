@@ -1,0 +1,178 @@
+#include "transom/ray_scene.h"
+
+#if TRANSOM_EMBREE_MAJOR >= 4
+#include <embree4/rtcore.h>
+#else
+#include <embree3/rtcore.h>
+#endif
+
+#include <algorithm>
+#include <string>
+
+#include "transom/error.h"
+
+namespace transom {
+namespace {
+
+constexpr std::size_t kWidth = 16;
+
+void report_error(void*, RTCError code, const char* text) {
+  throw std::runtime_error("Embree error " + std::to_string(static_cast<int>(code)) + ": " + (text ? text : ""));
+}
+
+RTCDevice shared_device() {
+  static const RTCDevice device = [] {
+    RTCDevice made = rtcNewDevice(nullptr);
+    if (!made) throw std::runtime_error("Embree cannot start: rtcNewDevice failed");
+    rtcSetDeviceErrorFunction(made, report_error, nullptr);
+    return made;
+  }();
+  return device;
+}
+
+// Embree 3 takes a context, Embree 4 optional arguments.
+#if TRANSOM_EMBREE_MAJOR >= 4
+void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays) { rtcIntersect16(valid, scene, rays, nullptr); }
+void occluded16(const int* valid, RTCScene scene, RTCRay16* rays) { rtcOccluded16(valid, scene, rays, nullptr); }
+#else
+void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect16(valid, scene, &context, rays);
+}
+void occluded16(const int* valid, RTCScene scene, RTCRay16* rays) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded16(valid, scene, &context, rays);
+}
+#endif
+
+void load_rays(std::span<const Ray> rays, RTCRay16& packet, int* valid) {
+  for (std::size_t i = 0; i < kWidth; ++i) {
+    const Ray& ray = rays[std::min(i, rays.size() - 1)];
+    valid[i] = i < rays.size() ? -1 : 0;
+    packet.org_x[i] = ray.origin.x;
+    packet.org_y[i] = ray.origin.y;
+    packet.org_z[i] = ray.origin.z;
+    packet.dir_x[i] = ray.direction.x;
+    packet.dir_y[i] = ray.direction.y;
+    packet.dir_z[i] = ray.direction.z;
+    packet.tnear[i] = ray.t_near;
+    packet.tfar[i] = ray.t_far;
+    packet.time[i] = 0;
+    packet.mask[i] = 0xffffffffu;
+    packet.id[i] = 0;
+    packet.flags[i] = 0;
+  }
+}
+
+}  // namespace
+
+struct RayScene::Tree {
+  RTCScene scene = nullptr;
+  std::vector<int> face_of_triangle;
+  std::vector<std::uint8_t> part_of_triangle;  // 0: corners a, b, c; 1: corners a, c, d
+  ~Tree() {
+    if (scene) rtcReleaseScene(scene);
+  }
+};
+
+RayScene::RayScene(const Faces& faces, const std::vector<Material>& materials,
+                   const std::vector<OpeningGroup>& openings)
+    : faces_(faces), materials_(materials), openings_(openings) {
+  for (const What what : {What::kOpaque, What::kOpenings, What::kAll}) {
+    auto tree = std::make_unique<Tree>();
+    std::vector<glm::vec3> corners;
+    for (std::size_t f = 0; f < faces.faces.size(); ++f) {
+      const Face& face = faces.faces[f];
+      const bool is_opening = materials[face.material].opening >= 0;
+      has_openings_ |= is_opening;
+      if (what != What::kAll && is_opening != (what == What::kOpenings)) continue;
+      for (int part = 0; part < (face.is_quad ? 2 : 1); ++part) {
+        corners.insert(corners.end(), {face.corner[0], face.corner[1 + part], face.corner[2 + part]});
+        tree->face_of_triangle.push_back(static_cast<int>(f));
+        tree->part_of_triangle.push_back(static_cast<std::uint8_t>(part));
+      }
+    }
+    tree->scene = rtcNewScene(shared_device());
+    rtcSetSceneFlags(tree->scene, RTC_SCENE_FLAG_ROBUST);
+    if (!corners.empty()) {
+      RTCGeometry geometry = rtcNewGeometry(shared_device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+      auto* vertex = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                                 3 * sizeof(float), corners.size()));
+      auto* index = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                                   3 * sizeof(unsigned), corners.size() / 3));
+      for (std::size_t i = 0; i < corners.size(); ++i) {
+        for (int axis = 0; axis < 3; ++axis) vertex[3 * i + static_cast<std::size_t>(axis)] = corners[i][axis];
+        index[i] = static_cast<unsigned>(i);
+      }
+      rtcCommitGeometry(geometry);
+      rtcAttachGeometry(tree->scene, geometry);
+      rtcReleaseGeometry(geometry);
+    }
+    rtcCommitScene(tree->scene);
+    trees_[static_cast<std::size_t>(what)] = std::move(tree);
+  }
+}
+
+RayScene::~RayScene() = default;
+
+void RayScene::intersect(What what, std::span<const Ray> rays, std::span<Hit> hits) const {
+  const Tree& tree = *trees_[static_cast<std::size_t>(what)];
+  alignas(64) int valid[kWidth];
+  RTCRayHit16 packet;
+  for (std::size_t begin = 0; begin < rays.size(); begin += kWidth) {
+    const std::size_t count = std::min(kWidth, rays.size() - begin);
+    load_rays(rays.subspan(begin, count), packet.ray, valid);
+    for (std::size_t i = 0; i < kWidth; ++i) {
+      packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+      packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    }
+    intersect16(valid, tree.scene, &packet);
+    for (std::size_t i = 0; i < count; ++i) {
+      Hit& hit = hits[begin + i];
+      if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
+        hit = Hit{};
+        continue;
+      }
+      const unsigned triangle = packet.hit.primID[i];
+      hit.face = tree.face_of_triangle[triangle];
+      const Face& face = faces_.faces[static_cast<std::size_t>(hit.face)];
+      hit.side = glm::dot(rays[begin + i].direction, face.normal) < 0 ? 0 : 1;
+      hit.t = packet.ray.tfar[i];
+      hit.st = face.parameters(tree.part_of_triangle[triangle], {packet.hit.u[i], packet.hit.v[i]});
+    }
+  }
+}
+
+void RayScene::occluded(What what, std::span<const Ray> rays, std::span<std::uint8_t> blocked) const {
+  const Tree& tree = *trees_[static_cast<std::size_t>(what)];
+  alignas(64) int valid[kWidth];
+  RTCRay16 packet;
+  for (std::size_t begin = 0; begin < rays.size(); begin += kWidth) {
+    const std::size_t count = std::min(kWidth, rays.size() - begin);
+    load_rays(rays.subspan(begin, count), packet, valid);
+    occluded16(valid, tree.scene, &packet);
+    for (std::size_t i = 0; i < count; ++i) blocked[begin + i] = packet.tfar[i] < 0;
+  }
+}
+
+float RayScene::transmittance(const Ray& ray) const {
+  if (!has_openings_) return 1;
+  constexpr int kMaximumCrossings = 64;
+  const float length = glm::length(ray.direction);
+  Ray rest = ray;
+  float product = 1;
+  for (int crossing = 0; crossing < kMaximumCrossings; ++crossing) {
+    Hit hit;
+    intersect(What::kOpenings, {&rest, 1}, {&hit, 1});
+    if (hit.face < 0) return product;
+    const Face& face = faces_.faces[static_cast<std::size_t>(hit.face)];
+    const OpeningGroup& group = openings_[static_cast<std::size_t>(materials_[static_cast<std::size_t>(face.material)].opening)];
+    product *= group.transmittance_at(glm::dot(face.normal, ray.direction) / length);
+    rest.t_near = hit.t * (1 + 4e-6f) + 0.1f * faces_.ray_offset() / length;
+  }
+  return product;
+}
+
+}  // namespace transom

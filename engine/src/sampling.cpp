@@ -1,0 +1,138 @@
+#include "transom/sampling.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace transom {
+namespace {
+
+constexpr int kDimensions = 4;
+
+struct Polynomial {
+  int degree;
+  std::uint32_t coefficients;
+  std::array<std::uint32_t, 3> initial;
+};
+
+// Joe & Kuo 2008, "new-joe-kuo-6": dimensions 2 to 4. Dimension 1 is van der Corput's sequence.
+constexpr std::array<Polynomial, kDimensions - 1> kPolynomials{
+    Polynomial{1, 0, {1, 0, 0}}, Polynomial{2, 1, {1, 3, 0}}, Polynomial{3, 1, {1, 3, 1}}};
+
+constexpr auto make_directions() {
+  std::array<std::array<std::uint32_t, 32>, kDimensions> directions{};
+  for (int bit = 0; bit < 32; ++bit) directions[0][bit] = 1u << (31 - bit);
+  for (int d = 1; d < kDimensions; ++d) {
+    const Polynomial& p = kPolynomials[d - 1];
+    for (int bit = 0; bit < 32; ++bit) {
+      if (bit < p.degree) {
+        directions[d][bit] = p.initial[bit] << (31 - bit);
+        continue;
+      }
+      std::uint32_t v = directions[d][bit - p.degree];
+      v ^= v >> p.degree;
+      for (int k = 1; k < p.degree; ++k)
+        if ((p.coefficients >> (p.degree - 1 - k)) & 1u) v ^= directions[d][bit - k];
+      directions[d][bit] = v;
+    }
+  }
+  return directions;
+}
+
+constexpr auto kDirections = make_directions();
+
+std::uint32_t reverse_bits(std::uint32_t x) {
+  x = (x >> 16) | (x << 16);
+  x = ((x & 0x00ff00ffu) << 8) | ((x & 0xff00ff00u) >> 8);
+  x = ((x & 0x0f0f0f0fu) << 4) | ((x & 0xf0f0f0f0u) >> 4);
+  x = ((x & 0x33333333u) << 2) | ((x & 0xccccccccu) >> 2);
+  return ((x & 0x55555555u) << 1) | ((x & 0xaaaaaaaau) >> 1);
+}
+
+// Hash that mixes only from low bits to high ones, so that on reversed bits it is an Owen scrambling [Burley 2020].
+std::uint32_t owen_scramble(std::uint32_t x, std::uint32_t seed) {
+  x = reverse_bits(x);
+  x += seed;
+  x ^= x * 0x6c50b47cu;
+  x ^= x * 0xb82f1e52u;
+  x ^= x * 0xc7afe638u;
+  x ^= x * 0x8d22f6e6u;
+  return reverse_bits(x);
+}
+
+float coordinate(std::uint32_t index, int dimension, std::uint32_t seed) {
+  std::uint32_t x = 0;
+  for (int bit = 0; index != 0; ++bit, index >>= 1)
+    if (index & 1u) x ^= kDirections[dimension][bit];
+  x = owen_scramble(x, hash_seed(seed, static_cast<std::uint64_t>(dimension)));
+  return std::min(static_cast<float>(x) * 0x1p-32f, 0x1.fffffep-1f);
+}
+
+}  // namespace
+
+glm::vec2 SobolSequence::point2(std::uint32_t index) const {
+  return {coordinate(index, 0, seed_), coordinate(index, 1, seed_)};
+}
+
+glm::vec4 SobolSequence::point4(std::uint32_t index) const {
+  return {coordinate(index, 0, seed_), coordinate(index, 1, seed_), coordinate(index, 2, seed_),
+          coordinate(index, 3, seed_)};
+}
+
+glm::vec2 sample_disc(glm::vec2 u) {
+  const glm::vec2 p = 2.f * u - 1.f;
+  if (p.x == 0 && p.y == 0) return {0, 0};
+  constexpr float kQuarterPi = std::numbers::pi_v<float> / 4;
+  if (std::abs(p.x) > std::abs(p.y)) {
+    const float phi = kQuarterPi * (p.y / p.x);
+    return p.x * glm::vec2(std::cos(phi), std::sin(phi));
+  }
+  const float phi = kQuarterPi * (p.x / p.y);
+  return p.y * glm::vec2(std::sin(phi), std::cos(phi));
+}
+
+glm::vec3 sample_cosine_hemisphere(glm::vec2 u) {
+  const glm::vec2 d = sample_disc(u);
+  return {d, std::sqrt(std::max(0.f, 1 - glm::dot(d, d)))};
+}
+
+glm::mat3 frame_from_normal(glm::vec3 n) {
+  const float sign = std::copysign(1.f, n.z);
+  const float a = -1 / (sign + n.z);
+  const float b = n.x * n.y * a;
+  return {{1 + sign * n.x * n.x * a, sign * b, -sign * n.x}, {b, sign + n.y * n.y * a, -n.y}, n};
+}
+
+glm::vec2 sample_triangle(glm::vec2 u) {
+  const float root = std::sqrt(u.x);
+  return {root * (1 - u.y), root * u.y};
+}
+
+SphericalTriangle::SphericalTriangle(glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) : a_(a), b_(b), c_(c) {
+  const glm::dvec3 ab = glm::cross(a, b), bc = glm::cross(b, c), ca = glm::cross(c, a);
+  if (glm::dot(ab, ab) == 0 || glm::dot(bc, bc) == 0 || glm::dot(ca, ca) == 0) return;
+  const auto angle = [](glm::dvec3 u, glm::dvec3 v) { return std::atan2(glm::length(glm::cross(u, v)), glm::dot(u, v)); };
+  alpha_ = angle(ab, -ca);
+  const double beta = angle(bc, -ab), gamma = angle(ca, -bc);
+  solid_angle_ = std::max(0.0, alpha_ + beta + gamma - std::numbers::pi);
+  cos_c_ = glm::dot(a, b);
+}
+
+glm::dvec3 SphericalTriangle::sample(glm::dvec2 u) const {
+  // Sub-triangle with corner a, side towards b, and u.x of the area; then a point on the arc to its third corner.
+  const double area = u.x * solid_angle_;
+  const double s = std::sin(area - alpha_), t = std::cos(area - alpha_);
+  const double cos_alpha = std::cos(alpha_), sin_alpha = std::sin(alpha_);
+  const double p = t - cos_alpha, q = s + sin_alpha * cos_c_;
+  const double denominator = (q * s + p * t) * sin_alpha;
+  const double k = denominator == 0 ? 1.0 : std::clamp(((q * t - p * s) * cos_alpha - q) / denominator, -1.0, 1.0);
+  const glm::dvec3 towards_c = glm::normalize(c_ - glm::dot(c_, a_) * a_);
+  const glm::dvec3 third = k * a_ + std::sqrt(1 - k * k) * towards_c;
+  const double z = 1 - u.y * (1 - glm::dot(third, b_));
+  const glm::dvec3 across = third - glm::dot(third, b_) * b_;
+  const double length = glm::length(across);
+  if (length == 0) return b_;
+  return z * b_ + std::sqrt(std::max(0.0, 1 - z * z)) / length * across;
+}
+
+}  // namespace transom

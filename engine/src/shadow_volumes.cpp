@@ -1,0 +1,407 @@
+/// @file Stencil shadow volumes: depth of what is seen, then for each kind of caster the volume's faces beyond it, counted.
+#include "transom/shadow_volumes.h"
+
+#include <glad/gl.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/ext/matrix_clip_space.hpp>
+#include <glm/ext/matrix_transform.hpp>
+#include <glm/gtc/type_ptr.hpp>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "shadow_casters.h"
+#include "transom/error.h"
+
+namespace transom {
+
+namespace {
+
+constexpr int kLargestSide = 4096;  // pixels
+
+/// Nearest depth drawn in proportion to the farthest, if a surface is closer than that: what 24 bits can carry.
+constexpr double kNearestDepthShare = 1e-4;
+
+/// Volumes are drawn a little farther away than the surfaces, so that a surface stays in front of the sides of its own volume
+/// when the sun grazes it: a share of the depth's slope (corners snap to 1/256 pixel) and steps of the depth buffer.
+constexpr float kOffsetSlopeShare = 1.0F / 64;
+constexpr float kOffsetDepthSteps = 4;
+
+constexpr const char* kVertexShader = R"(#version 330 core
+layout(location = 0) in vec4 position;  // w = 0: a direction, the point at infinity
+uniform mat4 clip_from_world;
+void main() {
+  gl_Position = clip_from_world * position;
+  gl_ClipDistance[0] = gl_Position.z + gl_Position.w;  // the near plane
+}
+)";
+constexpr const char* kFragmentShader = "#version 330 core\nvoid main() {}\n";
+
+GLuint compile_shader(const GladGLContext& gl, GLenum kind, const char* source) {
+  const GLuint shader = gl.CreateShader(kind);
+  gl.ShaderSource(shader, 1, &source, nullptr);
+  gl.CompileShader(shader);
+  GLint compiled = 0;
+  gl.GetShaderiv(shader, GL_COMPILE_STATUS, &compiled);
+  if (compiled) return shader;
+  std::array<char, 1024> log{};
+  gl.GetShaderInfoLog(shader, static_cast<GLsizei>(log.size()), nullptr, log.data());
+  gl.DeleteShader(shader);
+  throw GlError(std::string("Shadow volumes: a shader does not compile: ") + log.data());
+}
+
+GLuint link_program(const GladGLContext& gl) {
+  const GLuint program = gl.CreateProgram();
+  for (const auto& [kind, source] : {std::pair<GLenum, const char*>{GL_VERTEX_SHADER, kVertexShader},
+                                     std::pair<GLenum, const char*>{GL_FRAGMENT_SHADER, kFragmentShader}}) {
+    const GLuint shader = compile_shader(gl, kind, source);
+    gl.AttachShader(program, shader);
+    gl.DeleteShader(shader);
+  }
+  gl.LinkProgram(program);
+  GLint linked = 0;
+  gl.GetProgramiv(program, GL_LINK_STATUS, &linked);
+  if (!linked) throw GlError("Shadow volumes: the shader program does not link");
+  return program;
+}
+
+bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+void check_camera(const VolumeCamera& camera) {
+  if (camera.width < 1 || camera.height < 1 || camera.width > kLargestSide || camera.height > kLargestSide) {
+    throw InputError("Shadow volumes: a picture of " + std::to_string(camera.width) + " x " +
+                     std::to_string(camera.height) + " pixels is outside 1.." + std::to_string(kLargestSide));
+  }
+  if (!(camera.vertical_fov_rad > 0 && camera.vertical_fov_rad < std::numbers::pi)) {
+    throw InputError("Shadow volumes: a vertical field of view of " + std::to_string(camera.vertical_fov_rad) +
+                     " rad is outside 0..pi");
+  }
+  const glm::dvec3 side = glm::cross(camera.target - camera.position, camera.up);
+  if (!is_finite(camera.position) || !is_finite(side) || !(glm::length(side) > 0)) {
+    throw InputError("Shadow volumes: the camera's position, target and up do not span a picture");
+  }
+}
+
+/// Distance from a point to a triangle. [Ericson 2005, Real-Time Collision Detection, 5.1.5]
+double triangle_distance(glm::dvec3 point, glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) {
+  const auto to_segment = [&](glm::dvec3 from, glm::dvec3 to) {
+    const glm::dvec3 along = to - from;
+    const double length_squared = glm::dot(along, along);
+    const double t = length_squared > 0 ? std::clamp(glm::dot(point - from, along) / length_squared, 0.0, 1.0) : 0.0;
+    return glm::distance(point, from + t * along);
+  };
+  const glm::dvec3 normal = glm::cross(b - a, c - a);
+  const double area_squared = glm::dot(normal, normal);
+  if (area_squared > 0 && glm::dot(glm::cross(b - a, point - a), normal) >= 0 &&
+      glm::dot(glm::cross(c - b, point - b), normal) >= 0 && glm::dot(glm::cross(a - c, point - c), normal) >= 0) {
+    return std::abs(glm::dot(point - a, normal)) / std::sqrt(area_squared);
+  }
+  return std::min({to_segment(a, b), to_segment(b, c), to_segment(c, a)});
+}
+
+}  // namespace
+
+class ShadowVolumes::Impl {
+ public:
+  Impl(GlContext& context, std::span<const glm::vec3> vertices, std::span<const glm::uvec3> opaque_triangles,
+       std::span<const std::vector<glm::uvec3>> opening_triangles_by_group);
+  ~Impl();
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  BeamMask render(const VolumeCamera& camera, glm::dvec3 direction_to_sun);
+  int pass_count() const { return pass_count_; }
+
+ private:
+  struct Opening {
+    ShadowCasters casters;
+    std::vector<std::uint32_t> vertices;
+  };
+
+  void create_objects();
+  void delete_objects();
+  void resize(int width, int height);
+  glm::dmat4 clip_from_world(const VolumeCamera& camera) const;
+  void draw_visible_depth(const VolumeCamera& camera);
+  bool light_reaches_picture(const Opening& opening, glm::dvec3 direction_to_sun) const;
+  std::vector<std::uint8_t> count_crossings(const VolumeTriangles& volume);
+  std::vector<std::uint8_t> read_stencil() const;
+  void draw(std::size_t first, std::size_t count) const;
+
+  GlContext& context_;
+  const GladGLContext& gl_;
+  std::vector<glm::vec3> vertices_;
+  std::vector<glm::uvec3> opaque_triangles_;
+  std::vector<std::uint32_t> welded_;
+  std::optional<ShadowCasters> opaque_casters_;
+  std::vector<Opening> openings_;
+
+  GLuint program_ = 0, vertex_array_ = 0, vertex_buffer_ = 0, surface_buffer_ = 0, volume_buffer_ = 0;
+  GLuint framebuffer_ = 0, depth_stencil_ = 0;
+  GLint clip_from_world_location_ = -1;
+
+  VolumeCamera camera_;  // whose depth the framebuffer holds; width 0: none yet
+  glm::dmat4 clip_from_world_{1};
+  int pass_count_ = 0;
+};
+
+ShadowVolumes::Impl::Impl(GlContext& context, std::span<const glm::vec3> vertices,
+                          std::span<const glm::uvec3> opaque_triangles,
+                          std::span<const std::vector<glm::uvec3>> opening_triangles_by_group)
+    : context_(context), gl_(context.functions()), vertices_(vertices.begin(), vertices.end()) {
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    if (!is_finite(vertices[i])) throw InputError("Shadow volumes: vertex " + std::to_string(i) + " is not finite");
+  }
+  const auto check_indices = [&](std::span<const glm::uvec3> triangles) {
+    for (const glm::uvec3& triangle : triangles) {
+      const std::uint32_t largest = std::max({triangle.x, triangle.y, triangle.z});
+      if (largest >= vertices.size()) {
+        throw InputError("Shadow volumes: a triangle names vertex " + std::to_string(largest) + " of " +
+                         std::to_string(vertices.size()));
+      }
+    }
+  };
+  check_indices(opaque_triangles);
+  welded_ = weld_vertices(vertices);
+  for (const glm::uvec3& t : opaque_triangles) opaque_triangles_.emplace_back(welded_[t.x], welded_[t.y], welded_[t.z]);
+  opaque_casters_.emplace(vertices, welded_, opaque_triangles, CasterCount::kSolidsOnce);
+  for (const std::vector<glm::uvec3>& triangles : opening_triangles_by_group) {
+    check_indices(triangles);
+    Opening opening{ShadowCasters(vertices, welded_, triangles, CasterCount::kEveryTriangle), {}};
+    for (const glm::uvec3& t : triangles) opening.vertices.insert(opening.vertices.end(), {t.x, t.y, t.z});
+    openings_.push_back(std::move(opening));
+  }
+  const GlContext::Scope scope(context_);
+  try {
+    create_objects();
+  } catch (...) {
+    delete_objects();
+    throw;
+  }
+}
+
+ShadowVolumes::Impl::~Impl() {
+  try {
+    const GlContext::Scope scope(context_);
+    delete_objects();
+  } catch (const GlError&) {
+    // The context is busy in another thread, against its rules: its objects go when the context goes.
+  }
+}
+
+void ShadowVolumes::Impl::create_objects() {
+  program_ = link_program(gl_);
+  clip_from_world_location_ = gl_.GetUniformLocation(program_, "clip_from_world");
+
+  std::vector<glm::vec4> positions;
+  positions.reserve(vertices_.size() + 1);
+  for (const glm::vec3& vertex : vertices_) positions.emplace_back(vertex, 1.0F);
+  positions.emplace_back(0.0F);  // the point at infinity, set by each render
+  gl_.GenVertexArrays(1, &vertex_array_);
+  gl_.BindVertexArray(vertex_array_);
+  gl_.GenBuffers(1, &vertex_buffer_);
+  gl_.BindBuffer(GL_ARRAY_BUFFER, vertex_buffer_);
+  gl_.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(positions.size() * sizeof(glm::vec4)), positions.data(),
+                 GL_STATIC_DRAW);
+  gl_.EnableVertexAttribArray(0);
+  gl_.VertexAttribPointer(0, 4, GL_FLOAT, GL_FALSE, sizeof(glm::vec4), nullptr);
+
+  gl_.GenBuffers(1, &surface_buffer_);
+  gl_.BindBuffer(GL_ELEMENT_ARRAY_BUFFER, surface_buffer_);
+  gl_.BufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(opaque_triangles_.size() * sizeof(glm::uvec3)),
+                 opaque_triangles_.data(), GL_STATIC_DRAW);
+  gl_.GenBuffers(1, &volume_buffer_);
+  gl_.GenFramebuffers(1, &framebuffer_);
+  gl_.GenRenderbuffers(1, &depth_stencil_);
+}
+
+void ShadowVolumes::Impl::delete_objects() {
+  gl_.DeleteProgram(program_);
+  gl_.DeleteVertexArrays(1, &vertex_array_);
+  for (const GLuint buffer : {vertex_buffer_, surface_buffer_, volume_buffer_}) gl_.DeleteBuffers(1, &buffer);
+  gl_.DeleteFramebuffers(1, &framebuffer_);
+  gl_.DeleteRenderbuffers(1, &depth_stencil_);
+}
+
+void ShadowVolumes::Impl::resize(int width, int height) {
+  GLint largest_side = 0;
+  gl_.GetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &largest_side);
+  if (std::max(width, height) > largest_side) {
+    throw InputError("Shadow volumes: " + context_.name() + " draws up to " + std::to_string(largest_side) +
+                     " pixels a side");
+  }
+  gl_.BindRenderbuffer(GL_RENDERBUFFER, depth_stencil_);
+  gl_.RenderbufferStorage(GL_RENDERBUFFER, GL_DEPTH24_STENCIL8, width, height);
+  gl_.FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_STENCIL_ATTACHMENT, GL_RENDERBUFFER, depth_stencil_);
+  gl_.DrawBuffer(GL_NONE);
+  gl_.ReadBuffer(GL_NONE);
+  if (gl_.CheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
+    throw GlError("Shadow volumes: " + context_.name() + " has no depth (24 bits) with stencil (8 bits)");
+  }
+}
+
+/// Near and far depth stand as close around the visible surfaces as can be told: it is their ratio that costs resolution.
+glm::dmat4 ShadowVolumes::Impl::clip_from_world(const VolumeCamera& camera) const {
+  const glm::dmat4 view = glm::lookAt(camera.position, camera.target, camera.up);
+  double distance = std::numeric_limits<double>::infinity();
+  double farthest = 0;
+  for (const glm::uvec3& t : opaque_triangles_) {
+    const std::array<glm::dvec3, 3> corner{vertices_[t.x], vertices_[t.y], vertices_[t.z]};
+    distance = std::min(distance, triangle_distance(camera.position, corner[0], corner[1], corner[2]));
+    for (const glm::dvec3& point : corner) farthest = std::max(farthest, -(view * glm::dvec4(point, 1)).z);
+  }
+  if (!(farthest > 0)) farthest = 1;  // nothing before the camera
+  farthest *= 1.001;
+  const double aspect = static_cast<double>(camera.width) / camera.height;
+  const double half_height = std::tan(camera.vertical_fov_rad / 2);
+  const double corner_cosine = 1 / std::sqrt(1 + half_height * half_height * (1 + aspect * aspect));
+  const double nearest = std::clamp(0.99 * distance * corner_cosine, kNearestDepthShare * farthest, 0.5 * farthest);
+  return glm::perspective(camera.vertical_fov_rad, aspect, nearest, farthest) * view;
+}
+
+/// Base pass: depth of the surfaces seen through each pixel's centre. Glass writes none.
+void ShadowVolumes::Impl::draw_visible_depth(const VolumeCamera& camera) {
+  clip_from_world_ = clip_from_world(camera);
+  gl_.UniformMatrix4fv(clip_from_world_location_, 1, GL_FALSE, glm::value_ptr(glm::mat4(clip_from_world_)));
+  gl_.DepthMask(GL_TRUE);
+  gl_.Disable(GL_STENCIL_TEST);
+  gl_.Disable(GL_POLYGON_OFFSET_FILL);
+  gl_.Clear(GL_DEPTH_BUFFER_BIT);
+  gl_.BindBuffer(GL_ELEMENT_ARRAY_BUFFER, surface_buffer_);
+  draw(0, 3 * opaque_triangles_.size());
+  ++pass_count_;
+}
+
+/// False when no visible surface can lie in the light that comes through the opening: the light misses the picture's pyramid,
+/// or every surface is on the sun's side of the opening.
+bool ShadowVolumes::Impl::light_reaches_picture(const Opening& opening, glm::dvec3 direction_to_sun) const {
+  const glm::dmat4 rows = glm::transpose(clip_from_world_);
+  for (const glm::dvec4& plane : {rows[3] + rows[0], rows[3] - rows[0], rows[3] + rows[1], rows[3] - rows[1]}) {
+    const bool is_outside = glm::dot(glm::dvec3(plane), -direction_to_sun) <= 0 &&
+                            std::all_of(opening.vertices.begin(), opening.vertices.end(), [&](std::uint32_t v) {
+                              return glm::dot(plane, glm::dvec4(vertices_[v], 1)) < 0;
+                            });
+    if (is_outside) return false;
+  }
+  const auto height = [&](std::uint32_t v) { return glm::dot(glm::dvec3(vertices_[v]), direction_to_sun); };
+  double top = -std::numeric_limits<double>::infinity();
+  for (const std::uint32_t v : opening.vertices) top = std::max(top, height(v));
+  return std::any_of(opaque_triangles_.begin(), opaque_triangles_.end(), [&](const glm::uvec3& t) {
+    return std::min({height(t.x), height(t.y), height(t.z)}) < top;
+  });
+}
+
+/// One stencil pass: how many of the volume's casters lie between each visible point and the sun, modulo 256.
+///
+/// Counted beyond the visible point (z-fail), which stays right with the camera inside a volume: each of the volume's faces
+/// that the depth test hides adds one if it is left through (back) and takes one if it is entered through (front). Depth clamp
+/// keeps the faces that reach beyond the farthest depth. A cap at the very depth of the visible surface fails the test "less"
+/// and so counts as beyond: a lit surface does not shadow itself. [Everitt & Kilgard 2002]
+std::vector<std::uint8_t> ShadowVolumes::Impl::count_crossings(const VolumeTriangles& volume) {
+  gl_.DepthMask(GL_FALSE);
+  gl_.Enable(GL_STENCIL_TEST);
+  gl_.Enable(GL_POLYGON_OFFSET_FILL);
+  gl_.PolygonOffset(kOffsetSlopeShare, kOffsetDepthSteps);
+  gl_.StencilMask(0xFF);
+  gl_.StencilFunc(GL_ALWAYS, 0, 0xFF);
+  gl_.StencilOpSeparate(GL_FRONT, GL_KEEP, GL_DECR_WRAP, GL_KEEP);
+  gl_.StencilOpSeparate(GL_BACK, GL_KEEP, GL_INCR_WRAP, GL_KEEP);
+  gl_.Clear(GL_STENCIL_BUFFER_BIT);
+
+  gl_.BindBuffer(GL_ELEMENT_ARRAY_BUFFER, volume_buffer_);
+  gl_.BufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(volume.indices.size() * sizeof(std::uint32_t)),
+                 volume.indices.data(), GL_STREAM_DRAW);
+  gl_.FrontFace(GL_CW);
+  draw(0, volume.clockwise_count);
+  gl_.FrontFace(GL_CCW);
+  draw(volume.clockwise_count, volume.indices.size() - volume.clockwise_count);
+  ++pass_count_;
+  return read_stencil();
+}
+
+std::vector<std::uint8_t> ShadowVolumes::Impl::read_stencil() const {
+  const std::size_t width = static_cast<std::size_t>(camera_.width), height = static_cast<std::size_t>(camera_.height);
+  std::vector<std::uint8_t> stencil(width * height);
+  gl_.PixelStorei(GL_PACK_ALIGNMENT, 1);
+  gl_.ReadPixels(0, 0, camera_.width, camera_.height, GL_STENCIL_INDEX, GL_UNSIGNED_BYTE, stencil.data());
+  for (std::size_t y = 0; y < height / 2; ++y) {  // OpenGL's first row is the bottom one
+    const auto row = [&](std::size_t i) { return stencil.begin() + static_cast<std::ptrdiff_t>(i * width); };
+    std::swap_ranges(row(y), row(y + 1), row(height - 1 - y));
+  }
+  return stencil;
+}
+
+void ShadowVolumes::Impl::draw(std::size_t first, std::size_t count) const {
+  if (count == 0) return;
+  gl_.DrawElements(GL_TRIANGLES, static_cast<GLsizei>(count), GL_UNSIGNED_INT,
+                   reinterpret_cast<const void*>(first * sizeof(std::uint32_t)));
+}
+
+BeamMask ShadowVolumes::Impl::render(const VolumeCamera& camera, glm::dvec3 direction_to_sun) {
+  check_camera(camera);
+  if (!is_finite(direction_to_sun) || !(glm::length(direction_to_sun) > 0)) {
+    throw InputError("Shadow volumes: the direction to the sun is not a direction");
+  }
+  const glm::dvec3 sun = glm::normalize(direction_to_sun);
+  const std::size_t pixel_count = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  pass_count_ = 0;
+
+  const GlContext::Scope scope(context_);
+  gl_.BindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
+  gl_.Viewport(0, 0, camera.width, camera.height);
+  gl_.UseProgram(program_);
+  gl_.BindVertexArray(vertex_array_);
+  gl_.Enable(GL_DEPTH_TEST);
+  gl_.DepthFunc(GL_LESS);
+  gl_.Enable(GL_DEPTH_CLAMP);
+  gl_.Enable(GL_CLIP_DISTANCE0);
+  gl_.Disable(GL_CULL_FACE);
+  gl_.FrontFace(GL_CCW);
+  if (camera != camera_) {
+    const bool is_resized = camera.width != camera_.width || camera.height != camera_.height;
+    camera_.width = 0;  // until it has been drawn
+    if (is_resized) resize(camera.width, camera.height);
+    draw_visible_depth(camera);
+    camera_ = camera;
+  }
+  const glm::vec4 infinity(-sun, 0);
+  gl_.BindBuffer(GL_ARRAY_BUFFER, vertex_buffer_);
+  gl_.BufferSubData(GL_ARRAY_BUFFER, static_cast<GLintptr>(vertices_.size() * sizeof(glm::vec4)), sizeof(glm::vec4),
+                    glm::value_ptr(infinity));
+
+  const auto count = [&](const ShadowCasters& casters) {
+    const VolumeTriangles volume = casters.volume(sun, static_cast<std::uint32_t>(vertices_.size()));
+    return volume.empty() ? std::vector<std::uint8_t>(pixel_count, 0) : count_crossings(volume);
+  };
+  BeamMask mask{camera.width, camera.height, count(*opaque_casters_), {}};
+  for (std::uint8_t& pixel : mask.shadowed) pixel = pixel != 0;
+  for (const Opening& opening : openings_) {
+    mask.crossings.push_back(light_reaches_picture(opening, sun) ? count(opening.casters)
+                                                                  : std::vector<std::uint8_t>(pixel_count, 0));
+  }
+  if (const GLenum error = gl_.GetError(); error != GL_NO_ERROR) {
+    camera_.width = 0;
+    throw GlError("Shadow volumes: OpenGL error " + std::to_string(error) + " on " + context_.name());
+  }
+  return mask;
+}
+
+ShadowVolumes::ShadowVolumes(GlContext& context, std::span<const glm::vec3> vertices,
+                             std::span<const glm::uvec3> opaque_triangles,
+                             std::span<const std::vector<glm::uvec3>> opening_triangles_by_group)
+    : impl_(std::make_unique<Impl>(context, vertices, opaque_triangles, opening_triangles_by_group)) {}
+
+ShadowVolumes::~ShadowVolumes() = default;
+
+BeamMask ShadowVolumes::render(const VolumeCamera& camera, glm::dvec3 direction_to_sun) {
+  return impl_->render(camera, direction_to_sun);
+}
+
+int ShadowVolumes::pass_count() const { return impl_->pass_count(); }
+
+}  // namespace transom

@@ -1,0 +1,83 @@
+#include "transom/sky.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <string>
+
+#include "transom/error.h"
+
+namespace transom {
+namespace {
+
+constexpr float kTwoPi = 2 * std::numbers::pi_v<float>;
+
+float azimuth_of(glm::vec3 direction) {
+  const float azimuth = std::atan2(direction.y, direction.x);
+  return azimuth < 0 ? azimuth + kTwoPi : azimuth;
+}
+
+}  // namespace
+
+int SkyBins::sky_count() const { return std::accumulate(row_counts.begin(), row_counts.end(), 0); }
+
+SkyBinIndex::SkyBinIndex(const SkyBins& bins) : row_counts_(bins.row_counts) {
+  if (bins.row_altitude_edges.size() != bins.row_counts.size() + 1 || bins.row_counts.empty())
+    throw InputError("sky bins: row_altitude_edges must have one entry more than row_counts");
+  int first = 0;
+  for (std::size_t row = 0; row < row_counts_.size(); ++row) {
+    row_sines_.push_back(std::sin(bins.row_altitude_edges[row]));
+    row_first_.push_back(first);
+    first += row_counts_[row];
+  }
+  count_ = first + 1;
+}
+
+int SkyBinIndex::operator()(glm::vec3 direction) const {
+  if (direction.z < 0) return count_ - 1;
+  const auto above = std::upper_bound(row_sines_.begin() + 1, row_sines_.end(), direction.z);
+  const auto row = static_cast<std::size_t>(above - row_sines_.begin()) - 1;
+  const int bin = static_cast<int>(azimuth_of(direction) / kTwoPi * static_cast<float>(row_counts_[row]));
+  return row_first_[row] + std::min(bin, row_counts_[row] - 1);
+}
+
+void Condition::validate(int sky_bin_count) const {
+  if (static_cast<int>(sky_luminance.size()) != sky_bin_count)
+    throw InputError("the sky vector has " + std::to_string(sky_luminance.size()) + " entries, the engine's sky has " +
+                     std::to_string(sky_bin_count));
+  for (const float l : sky_luminance)
+    if (!(l >= 0 && std::isfinite(l))) throw InputError("the sky vector holds a value that is negative or not finite");
+  for (const Beam& beam : beams) {
+    if (std::abs(glm::length(beam.direction_to_source) - 1) > 1e-3f)
+      throw InputError("the direction of a beam is not a unit vector");
+    for (int c = 0; c < 3; ++c)
+      if (!(beam.normal_illuminance[c] >= 0 && std::isfinite(beam.normal_illuminance[c])))
+        throw InputError("the illuminance of a beam is negative or not finite");
+  }
+  for (int c = 0; c < 3; ++c)
+    if (!(ground_luminance[c] >= 0 && std::isfinite(ground_luminance[c])) || !(sky_colour[c] >= 0))
+      throw InputError("the ground's luminance or the sky's colour is negative or not finite");
+  if (picture.size() != static_cast<std::size_t>(picture_width) * static_cast<std::size_t>(picture_height))
+    throw InputError("the picture of the sky does not have width x height texels");
+}
+
+glm::vec3 Condition::seen(glm::vec3 direction, const SkyBinIndex& bins) const {
+  if (picture.empty()) {
+    const int bin = bins(direction);
+    return bin == bins.count() - 1 ? ground_luminance : sky_luminance[bin] * sky_colour;
+  }
+  const float theta = std::acos(std::clamp(direction.z, -1.f, 1.f));
+  const float y = theta / std::numbers::pi_v<float> * static_cast<float>(picture_height - 1);
+  const float x = azimuth_of(direction) / kTwoPi * static_cast<float>(picture_width) - 0.5f;
+  const int y0 = std::clamp(static_cast<int>(y), 0, picture_height - 2);
+  const int x0 = static_cast<int>(std::floor(x));
+  const float fy = y - static_cast<float>(y0), fx = x - static_cast<float>(x0);
+  const auto texel = [&](int column, int row) {
+    return picture[row * picture_width + (column + picture_width) % picture_width];
+  };
+  return (1 - fy) * ((1 - fx) * texel(x0, y0) + fx * texel(x0 + 1, y0)) +
+         fy * ((1 - fx) * texel(x0, y0 + 1) + fx * texel(x0 + 1, y0 + 1));
+}
+
+}  // namespace transom

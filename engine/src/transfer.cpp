@@ -1,0 +1,176 @@
+#include "transom/transfer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace transom {
+namespace {
+
+constexpr int kMaximumScalings = 50;
+constexpr double kRowSumTolerance = 1e-7;
+constexpr double kLargestStep = 1.0;         // of a logarithm of a scale
+constexpr int kMaximumGradientSteps = 300;
+constexpr double kGradientTolerance = 1e-3;  // relative: Newton's method needs no more
+
+SparseRows transpose(const SparseRows& rows) {
+  SparseRows result;
+  const std::size_t n = rows.row_count();
+  std::vector<std::size_t> count(n + 1, 0);
+  for (const Share& s : rows.entries) ++count[s.index + 1];
+  for (std::size_t i = 0; i < n; ++i) count[i + 1] += count[i];
+  result.begin = count;
+  result.entries.resize(rows.entries.size());
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t k = rows.begin[i]; k < rows.begin[i + 1]; ++k)
+      result.entries[count[rows.entries[k].index]++] = {static_cast<int>(i), rows.entries[k].weight};
+  return result;
+}
+
+// One A_i F_ij for every pair that either patch has seen. With equal numbers of rays a patch, the variance of its estimate
+// is in proportion to its area: the smaller patch, whose rays are denser, has the larger say.
+SparseRows average_both_ways(const SparseRows& exchange, const std::vector<float>& areas, double& defect) {
+  const SparseRows reverse = transpose(exchange);
+  SparseRows result;
+  result.entries.reserve(2 * exchange.entries.size());
+  double difference = 0, sum = 0;
+  std::vector<Share> row;
+  for (std::size_t i = 0; i < exchange.row_count(); ++i) {
+    row.clear();
+    std::size_t a = exchange.begin[i], b = reverse.begin[i];
+    while (a < exchange.begin[i + 1] || b < reverse.begin[i + 1]) {
+      const bool has_a = a < exchange.begin[i + 1], has_b = b < reverse.begin[i + 1];
+      const int index = std::min(has_a ? exchange.entries[a].index : INT32_MAX, has_b ? reverse.entries[b].index : INT32_MAX);
+      const float forth = has_a && exchange.entries[a].index == index ? exchange.entries[a++].weight : 0;
+      const float back = has_b && reverse.entries[b].index == index ? reverse.entries[b++].weight : 0;
+      difference += std::abs(static_cast<double>(forth) - back);
+      const float own_say = areas[index] / (areas[i] + areas[index]);
+      const float mean = own_say * forth + (1 - own_say) * back;
+      sum += mean;
+      row.push_back({index, mean});
+    }
+    result.append(row);
+  }
+  defect = sum > 0 ? difference / sum : 0;
+  return result;
+}
+
+// Conjugate gradients with the diagonal as preconditioner, for a positive (semi-)definite operator.
+template <typename Operator>
+void solve_positive_definite(const Operator& apply, const std::vector<double>& diagonal, const std::vector<double>& right,
+                             std::vector<double>& x) {
+  const std::size_t n = right.size();
+  std::vector<double> r = right, z(n), p(n), q(n);
+  std::fill(x.begin(), x.end(), 0.0);
+  const auto precondition = [&] {
+    double product = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      z[i] = diagonal[i] > 0 ? r[i] / diagonal[i] : 0;
+      product += r[i] * z[i];
+    }
+    return product;
+  };
+  double rho = precondition();
+  const double target = kGradientTolerance * kGradientTolerance * rho;
+  p = z;
+  for (int step = 0; step < kMaximumGradientSteps && rho > target; ++step) {
+    apply(p, q);
+    double curvature = 0;
+    for (std::size_t i = 0; i < n; ++i) curvature += p[i] * q[i];
+    if (!(curvature > 0)) return;
+    const double alpha = rho / curvature;
+    for (std::size_t i = 0; i < n; ++i) {
+      x[i] += alpha * p[i];
+      r[i] -= alpha * q[i];
+    }
+    const double next = precondition(), beta = next / rho;
+    rho = next;
+    for (std::size_t i = 0; i < n; ++i) p[i] = z[i] + beta * p[i];
+  }
+}
+
+}  // namespace
+
+TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<float>& areas,
+                                const std::vector<float>& row_sums) {
+  TransferDefects defects;
+  const std::size_t n = form_factors.row_count();
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t k = form_factors.begin[i]; k < form_factors.begin[i + 1]; ++k) form_factors.entries[k].weight *= areas[i];
+  const SparseRows exchange = average_both_ways(form_factors, areas, defects.raw_reciprocity);
+
+  std::vector<double> scale(n, 1.0), sum(n, 0.0), residual(n), step(n);
+  // Row i of diag(scale) S diag(scale), times x.
+  const auto scaled_product = [&](std::size_t i, const std::vector<double>& x) {
+    double row = 0;
+    for (std::size_t k = exchange.begin[i]; k < exchange.begin[i + 1]; ++k) {
+      const Share& entry = exchange.entries[k];
+      row += static_cast<double>(entry.weight) * scale[entry.index] * x[entry.index];
+    }
+    return scale[i] * row;
+  };
+  const std::vector<double> ones(n, 1.0);
+  const auto worst_row_sum = [&] {
+    double worst = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      sum[i] = scaled_product(i, ones);
+      residual[i] = sum[i] > 0 ? areas[i] * static_cast<double>(row_sums[i]) - sum[i] : 0;
+      if (sum[i] > 0) worst = std::max(worst, std::abs(residual[i]) / areas[i]);
+    }
+    return worst;
+  };
+  defects.raw_row_sum = defects.row_sum = worst_row_sum();
+  for (; defects.row_sum > kRowSumTolerance && defects.iterations < kMaximumScalings; ++defects.iterations) {
+    // Newton's step for the logarithms of the scales: (diag(sum) + D S D) step = residual, by conjugate gradients.
+    solve_positive_definite(
+        [&](const std::vector<double>& x, std::vector<double>& y) {
+          for (std::size_t i = 0; i < n; ++i) y[i] = sum[i] > 0 ? sum[i] * x[i] + scaled_product(i, x) : x[i];
+        },
+        sum, residual, step);
+    double largest = 0;
+    for (const double s : step) largest = std::max(largest, std::abs(s));
+    const double damping = largest > kLargestStep ? kLargestStep / largest : 1.0;
+    for (std::size_t i = 0; i < n; ++i) scale[i] *= std::exp(damping * step[i]);
+    defects.row_sum = worst_row_sum();
+  }
+
+  form_factors = exchange;
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t k = form_factors.begin[i]; k < form_factors.begin[i + 1]; ++k) {
+      Share& entry = form_factors.entries[k];
+      entry.weight = static_cast<float>(entry.weight * scale[i] * scale[entry.index] / areas[i]);
+    }
+  const SparseRows reverse = transpose(form_factors);
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t k = form_factors.begin[i]; k < form_factors.begin[i + 1]; ++k) {
+      const int j = form_factors.entries[k].index;
+      const double forth = static_cast<double>(areas[i]) * form_factors.entries[k].weight;
+      const double back = static_cast<double>(areas[j]) * reverse.entries[k].weight;
+      defects.reciprocity = std::max(defects.reciprocity, std::abs(forth - back) / std::max(areas[i], areas[j]));
+    }
+  return defects;
+}
+
+int solve_interreflection(const SparseRows& form_factors, const SparseRows& through,
+                          const std::vector<glm::vec3>& reflectance, const std::vector<glm::vec3>& emitted,
+                          const std::vector<glm::vec3>& direct, const std::vector<float>& areas, double tolerance,
+                          int maximum_sweeps, std::vector<glm::vec3>& irradiance) {
+  const std::size_t n = form_factors.row_count();
+  std::vector<glm::vec3> radiosity(n);
+  for (std::size_t i = 0; i < n; ++i) radiosity[i] = emitted[i] + reflectance[i] * irradiance[i];
+  for (int sweep = 1; sweep <= maximum_sweeps; ++sweep) {
+    double change = 0, total = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const glm::vec3 e = direct[i] + form_factors.dot(i, radiosity) + through.dot(i, radiosity);
+      const glm::vec3 difference = glm::abs(e - irradiance[i]) * reflectance[i];
+      change += static_cast<double>(areas[i]) * (difference.x + difference.y + difference.z);
+      irradiance[i] = e;
+      radiosity[i] = emitted[i] + reflectance[i] * e;
+      total += static_cast<double>(areas[i]) * (radiosity[i].x + radiosity[i].y + radiosity[i].z);
+    }
+    if (!(change > tolerance * total)) return sweep;
+  }
+  throw std::runtime_error("interreflection has not converged: is the room closed and almost perfectly white?");
+}
+
+}  // namespace transom

@@ -1,0 +1,35 @@
+#include "transom/view.h"
+
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "transom/error.h"
+
+namespace transom {
+
+void View::validate() const {
+  constexpr int kMaximumSize = 16384;
+  if (width < 1 || height < 1 || width > kMaximumSize || height > kMaximumSize)
+    throw InputError("the picture's size " + std::to_string(width) + " x " + std::to_string(height) + " is outside 1.." +
+                     std::to_string(kMaximumSize));
+  if (!(vertical_fov_rad > 0 && vertical_fov_rad < std::numbers::pi))
+    throw InputError("the vertical field of view is outside 0..180 degrees");
+  const glm::dvec3 forward = target - position;
+  if (!(glm::length(glm::cross(forward, up)) > 1e-9 * glm::length(forward) * glm::length(up)))
+    throw InputError("the camera's target is at its position, or straight along its up direction");
+}
+
+CameraRays::CameraRays(const View& view) : width_(view.width), height_(view.height) {
+  view.validate();
+  forward_ = glm::normalize(view.target - view.position);
+  const double half_height = std::tan(view.vertical_fov_rad / 2);
+  right_ = glm::normalize(glm::cross(forward_, view.up)) * (half_height * width_ / height_);
+  down_ = glm::normalize(glm::cross(forward_, right_)) * half_height;
+}
+
+glm::vec3 CameraRays::direction(glm::vec2 pixel) const {
+  return glm::vec3(glm::normalize(forward_ + (2.0 * pixel.x / width_ - 1.0) * right_ + (2.0 * pixel.y / height_ - 1.0) * down_));
+}
+
+}  // namespace transom

@@ -1,0 +1,28 @@
+"""The one exception for bad input: names the file, the field, the value found, what is allowed and what to do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class InputError(Exception):
+    """Bad input. Its text is one line that a user can act on: `file: field = value <problem>. <remedy>`."""
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        file: str | Path | None = None,
+        field: str | None = None,
+        value: object = None,
+        remedy: str | None = None,
+    ) -> None:
+        place = f"{file}: " if file is not None else ""
+        subject = ""
+        if field is not None:
+            subject = f"{field} = {value!r} " if value is not None else f"{field} "
+        text = f"{place}{subject}{problem}".rstrip(". ") + "."
+        if remedy:
+            text += f" {remedy.rstrip('. ')}."
+        super().__init__(text)
+        self.file, self.field, self.value, self.remedy = file, field, value, remedy
