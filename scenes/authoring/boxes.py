@@ -31,6 +31,7 @@ SIDES = {  # side: corner choices (0 low, 1 high) and the direction its front fa
 def _box(low: Point, high: Point, materials: dict[str, str]) -> Mesh:
     mesh = Mesh()
     for side, (choices, facing) in SIDES.items():
-        corners = [tuple((low, high)[c][axis] for axis, c in enumerate(choice)) for choice in choices]
+        ends = (low, high)
+        corners = [(ends[x][0], ends[y][1], ends[z][2]) for x, y, z in choices]
         mesh.quad(corners, facing, materials[side], side, None)
     return mesh

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 Point = tuple[float, float, float]
 Place = Callable[[float, float, float], Point]  # plate coordinates (u, v, w) -> room coordinates
@@ -48,7 +49,7 @@ class Mesh:
     def quad(
         self,
         corners: Sequence[Point],
-        facing: Sequence[float],
+        facing: Sequence[float] | NDArray[np.float64],
         material: str,
         object_name: str,
         solid: int | None,
@@ -157,7 +158,7 @@ class Mesh:
         """Raise ValueError for a face without area, a quad that is not planar, a solid that is open or inside out."""
         points = np.asarray(self.vertices)
         edges: dict[int, Counter[tuple[int, int]]] = {}
-        volume: Counter[int] = Counter()
+        volume: dict[int, float] = {}
         for face in self.faces:
             p = points[list(face.vertices)]
             normal = sum(np.cross(p[i] - p[0], p[i + 1] - p[0]) for i in range(1, len(p) - 1))
@@ -170,7 +171,8 @@ class Mesh:
             for a, b in zip(face.vertices, face.vertices[1:] + face.vertices[:1], strict=True):
                 edges.setdefault(face.solid, Counter())[(min(a, b), max(a, b))] += 1 if a < b else -1
             for i in range(1, len(p) - 1):
-                volume[face.solid] += float(np.dot(p[0], np.cross(p[i], p[i + 1]))) / 6
+                share = float(np.dot(p[0], np.cross(p[i], p[i + 1]))) / 6
+                volume[face.solid] = volume.get(face.solid, 0.0) + share
         for face in self.faces:
             if face.solid is not None and (any(edges[face.solid].values()) or volume[face.solid] <= 0):
                 raise ValueError(f"{face.object}: a solid is open or inside out (volume {volume[face.solid]:.6g} m³)")

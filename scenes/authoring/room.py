@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,6 +22,8 @@ class Shell:
     plan: (columns, rows, 2) inner corner points of a grid that fills the floor; the four borders of the grid are the
     walls (row 0 south, last row north, column 0 west, last column east), straight or curved. heights: z lines of the
     walls, from floor to ceiling. All inner faces follow this grid, so that floor, walls and ceiling share vertices.
+    smooth_sides: for a curved wall, the inward unit normals (columns, 2) at its corner points.
+    materials: material by object name (floor, ceiling, wall_<side>, reveal, exterior); "wall" where none is given.
     holes: (side, cell): side "south", "north", "west" or "east" with cell (along, height), or "roof" (column, row).
     """
 
@@ -52,26 +54,26 @@ class Shell:
         def outer(i: int, j: int, k: int) -> Point:
             return (float(outer_plan[i, j, 0]), float(outer_plan[i, j, 1]), float(outer_z[k]))
 
-        grids: dict[str, tuple[int, int, int, object]] = {
-            "floor": (columns - 1, rows - 1, 0, lambda a, b: (a, b, 0)),
-            "roof": (columns - 1, rows - 1, 0, lambda a, b: (a, b, last)),
-            "south": (columns - 1, last, 0, lambda a, b: (a, 0, b)),
-            "north": (columns - 1, last, 0, lambda a, b: (a, rows - 1, b)),
-            "west": (rows - 1, last, 0, lambda a, b: (0, a, b)),
-            "east": (rows - 1, last, 0, lambda a, b: (columns - 1, a, b)),
+        grids: dict[str, tuple[int, int, Callable[[int, int], tuple[int, int, int]]]] = {
+            "floor": (columns - 1, rows - 1, lambda a, b: (a, b, 0)),
+            "roof": (columns - 1, rows - 1, lambda a, b: (a, b, last)),
+            "south": (columns - 1, last, lambda a, b: (a, 0, b)),
+            "north": (columns - 1, last, lambda a, b: (a, rows - 1, b)),
+            "west": (rows - 1, last, lambda a, b: (0, a, b)),
+            "east": (rows - 1, last, lambda a, b: (columns - 1, a, b)),
         }
         thickness = {"floor": self.slab_thickness_m, "roof": self.roof_thickness_m}
-        for side, (count_a, count_b, _, index) in grids.items():
+        for side, (count_a, count_b, index) in grids.items():
             name = {"floor": "floor", "roof": "ceiling"}.get(side, f"wall_{side}")
             material = self.materials.get(name, "wall")
             seat = 1 - (FRAME_DEPTH_M + FRAME_INSET_M) / thickness.get(side, self.wall_thickness_m)
             for a in range(count_a):
                 for b in range(count_b):
-                    ring = [index(*c) for c in ((a, b), (a + 1, b), (a + 1, b + 1), (a, b + 1))]  # type: ignore[operator]
+                    ring = [index(*c) for c in ((a, b), (a + 1, b), (a + 1, b + 1), (a, b + 1))]
                     inside, outside = [inner(*c) for c in ring], [outer(*c) for c in ring]
                     outwards = np.mean(outside, axis=0) - np.mean(inside, axis=0)
                     if (side, (a, b)) not in self.holes:
-                        normals = ()
+                        normals: tuple[Point, ...] = ()
                         if side in self.smooth_sides:
                             normals = tuple((*self.smooth_sides[side][c], 0.0) for c in (a, a + 1, a + 1, a))
                         mesh.quad(inside, -outwards, material, name, solid, normals)
