@@ -1,5 +1,5 @@
-/// @file OSMesa and EGL, opened by name at run time. Their few constants and functions are declared here, so that neither
-/// headers nor libraries of OpenGL are needed to build. [OSMesa: GL/osmesa.h; EGL 1.4, EGL_EXT_platform_base,
+/// @file OSMesa and EGL, opened by name at run time. Their few constants and functions are declared here, so that
+/// neither headers nor libraries of OpenGL are needed to build. [OSMesa: GL/osmesa.h; EGL 1.4, EGL_EXT_platform_base,
 /// EGL_MESA_platform_surfaceless, EGL_KHR_create_context]
 #include "transom/gl_context.h"
 
@@ -65,8 +65,8 @@ class OsmesaPlatform final : public GlContext::Platform {
         destroy_(symbol<Destroy>(library_, "OSMesaDestroyContext")),
         function_(symbol<GetProcAddress>(library_, "OSMesaGetProcAddress")) {
     constexpr int kFormat = 0x22, kRgba = 0x1908, kProfile = 0x33, kCoreProfile = 0x34, kMajor = 0x36, kMinor = 0x37;
-    constexpr std::array attributes{kFormat,       kRgba,  kProfile,      kCoreProfile, kMajor,
-                                    kMajorVersion, kMinor, kMinorVersion, 0};
+    constexpr std::array attributes{kFormat, kRgba,         kProfile, kCoreProfile, kMajor, kMajorVersion,
+                                    kMinor,  kMinorVersion, 0};
     context_ = symbol<Create>(library_, "OSMesaCreateContextAttribs")(attributes.data(), nullptr);
     if (!context_) throw GlError(library_.name + " gave no OpenGL 3.3 core context");
   }
@@ -119,12 +119,12 @@ class EglPlatform final : public GlContext::Platform {
     void* config = nullptr;
     int config_count = 0;
     if (!symbol<ChooseConfig>(library_, "eglChooseConfig")(display_, config_attributes.data(), &config, 1,
-                                                            &config_count) ||
+                                                           &config_count) ||
         config_count == 0) {
       fail("eglChooseConfig(OpenGL)");
     }
     constexpr int kMajor = 0x3098, kMinor = 0x30FB, kProfileMask = 0x30FD, kCoreProfile = 0x1;
-    constexpr std::array context_attributes{kMajor,        kMajorVersion, kMinor,       kMinorVersion,
+    constexpr std::array context_attributes{kMajor,       kMajorVersion, kMinor, kMinorVersion,
                                             kProfileMask, kCoreProfile,  kNone};
     context_ = symbol<Create>(library_, "eglCreateContext")(display_, config, nullptr, context_attributes.data());
     if (!context_) fail("eglCreateContext(OpenGL 3.3 core)");
@@ -189,8 +189,8 @@ GlContext::GlContext(Backend backend) : functions_(std::make_unique<GladGLContex
         throw GlError("the context lacks OpenGL 3.3");
       }
       backend_ = kind;
-      name_ = platform_->name() + ", OpenGL " + text_of(*functions_, GL_VERSION) + ", " +
-              text_of(*functions_, GL_RENDERER);
+      name_ =
+          platform_->name() + ", OpenGL " + text_of(*functions_, GL_VERSION) + ", " + text_of(*functions_, GL_RENDERER);
     } catch (const GlError& error) {
       platform_.reset();
       failures += std::string("\n  ") + label + ": " + error.what();
@@ -213,6 +213,8 @@ GlContext::Scope::Scope(const GlContext& context) : context_(context) {
   }
 }
 
-GlContext::Scope::~Scope() { context_.platform_->make_current(false); }
+GlContext::Scope::~Scope() {
+  context_.platform_->make_current(false);
+}
 
 }  // namespace transom

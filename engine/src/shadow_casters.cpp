@@ -1,6 +1,7 @@
-/// @file Silhouettes by signed edges: every caster triangle, turned towards the sun, adds its three directed edges; what two
-/// neighbours add in opposite directions vanishes; what remains, with its multiplicity, bounds the volume. Exact for open
-/// sheets, for edges shared by any number of triangles and for solids alike. [Heidmann 1991; McGuire et al. 2003]
+/// @file Silhouettes by signed edges: every caster triangle, turned towards the sun, adds its three directed edges;
+/// what two neighbours add in opposite directions vanishes; what remains, with its multiplicity, bounds the volume.
+/// Exact for open sheets, for edges shared by any number of triangles and for solids alike. [Heidmann 1991; McGuire et
+/// al. 2003]
 #include "shadow_casters.h"
 
 #include <algorithm>
@@ -87,10 +88,10 @@ void ShadowCasters::connect_edges() {
 
 /// Finds the closed, consistently oriented solids and lets only one of their two sides cast.
 ///
-/// The triangles that a ray to the sun leaves a solid through face the sun, those it enters through face away. From a point
-/// that is not inside, both are equally many; from a point inside a solid whose normals look out, there is one more to leave
-/// through; inside a room whose normals look in, one more of the others. So fronts suffice for the former (positive enclosed
-/// volume), backs for the latter, wherever the point is.
+/// The triangles that a ray to the sun leaves a solid through face the sun, those it enters through face away. From a
+/// point that is not inside, both are equally many; from a point inside a solid whose normals look out, there is one
+/// more to leave through; inside a room whose normals look in, one more of the others. So fronts suffice for the former
+/// (positive enclosed volume), backs for the latter, wherever the point is.
 void ShadowCasters::find_solids(std::span<const glm::vec3> vertices) {
   std::vector<std::vector<std::pair<std::uint32_t, int>>> sharers(edges_.size());  // triangle, direction along the edge
   for (std::uint32_t t = 0; t < triangles_.size(); ++t) {

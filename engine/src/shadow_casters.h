@@ -9,8 +9,8 @@
 
 namespace transom {
 
-/// For each vertex the first vertex at exactly the same position (0 and -0 alike): meshes repeat vertices where normals or
-/// materials change, and a silhouette must not see a border there.
+/// For each vertex the first vertex at exactly the same position (0 and -0 alike): meshes repeat vertices where normals
+/// or materials change, and a silhouette must not see a border there.
 std::vector<std::uint32_t> weld_vertices(std::span<const glm::vec3> vertices);
 
 /// What may be counted between a point and the sun.
@@ -19,9 +19,10 @@ enum class CasterCount {
   kSolidsOnce,     ///< a closed solid counts once for each time that it is passed through: fewer sides to draw
 };
 
-/// Triangles, as indices, whose signed crossings along a line give the count of casters between a point and the sun. Seen from
-/// outside the volume they run counter-clockwise, except the first `clockwise_count` indices, which run clockwise: the caps
-/// keep their own vertex order, so that they are drawn at exactly the depth at which the surface was drawn.
+/// Triangles, as indices, whose signed crossings along a line give the count of casters between a point and the sun.
+/// Seen from outside the volume they run counter-clockwise, except the first `clockwise_count` indices, which run
+/// clockwise: the caps keep their own vertex order, so that they are drawn at exactly the depth at which the surface
+/// was drawn.
 struct VolumeTriangles {
   std::vector<std::uint32_t> indices;
   std::size_t clockwise_count = 0;
@@ -37,8 +38,8 @@ class ShadowCasters {
                 std::span<const glm::uvec3> triangles, CasterCount count);
 
   /// The near caps and the silhouette sides of the volume away from the unit vector `direction_to_sun`. A side is a
-  /// triangle, its third vertex `infinity_index` the point at infinity: parallel light needs no far cap, since it would be
-  /// that one point [Everitt & Kilgard 2002].
+  /// triangle, its third vertex `infinity_index` the point at infinity: parallel light needs no far cap, since it would
+  /// be that one point [Everitt & Kilgard 2002].
   VolumeTriangles volume(glm::dvec3 direction_to_sun, std::uint32_t infinity_index) const;
 
  private:
@@ -49,9 +50,9 @@ class ShadowCasters {
 
   struct Triangle {
     glm::uvec3 vertices;
-    glm::uvec3 edges;        // edge i runs between vertices i and i + 1
-    glm::ivec3 along;        // +1 if the triangle runs along the edge, -1 against it
-    glm::dvec3 normal;       // unit
+    glm::uvec3 edges;   // edge i runs between vertices i and i + 1
+    glm::ivec3 along;   // +1 if the triangle runs along the edge, -1 against it
+    glm::dvec3 normal;  // unit
     Casting casting = Casting::kBoth;
   };
 

@@ -1,4 +1,5 @@
-/// @file Stencil shadow volumes: depth of what is seen, then for each kind of caster the volume's faces beyond it, counted.
+/// @file Stencil shadow volumes: depth of what is seen, then for each kind of caster the volume's faces beyond it,
+/// counted.
 #include "transom/shadow_volumes.h"
 
 #include <glad/gl.h>
@@ -27,17 +28,20 @@ constexpr int kLargestSide = 4096;  // pixels
 /// Nearest depth drawn in proportion to the farthest, if a surface is closer than that: what 24 bits can carry.
 constexpr double kNearestDepthShare = 1e-4;
 
-/// Volumes are drawn a little farther away than the surfaces, so that a surface stays in front of the sides of its own volume
-/// when the sun grazes it: a share of the depth's slope (corners snap to 1/256 pixel) and steps of the depth buffer.
-constexpr float kOffsetSlopeShare = 1.0F / 64;
-constexpr float kOffsetDepthSteps = 4;
+/// Volumes are drawn a little farther away than the surfaces, so that a surface stays in front of the sides of its own
+/// volume when the sun grazes it: a share of the depth's slope (corners snap to 1/256 pixel) and steps of the depth
+/// buffer. More would move shadow edges where a side is seen nearly edge-on, since its slope is steep.
+constexpr float kOffsetSlopeShare = 1.0F / 512;
+constexpr float kOffsetDepthSteps = 2;
 
 constexpr const char* kVertexShader = R"(#version 330 core
 layout(location = 0) in vec4 position;  // w = 0: a direction, the point at infinity
 uniform mat4 clip_from_world;
 void main() {
   gl_Position = clip_from_world * position;
-  gl_ClipDistance[0] = gl_Position.z + gl_Position.w;  // the near plane
+  // Depth clamp is wanted beyond the farthest depth only. Before the nearest one it would divide by a w of almost nothing,
+  // and the depth interpolated across such a triangle is noise.
+  gl_ClipDistance[0] = gl_Position.z + gl_Position.w;
 }
 )";
 constexpr const char* kFragmentShader = "#version 330 core\nvoid main() {}\n";
@@ -70,7 +74,9 @@ GLuint link_program(const GladGLContext& gl) {
   return program;
 }
 
-bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+bool is_finite(glm::dvec3 v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 
 void check_camera(const VolumeCamera& camera) {
   if (camera.width < 1 || camera.height < 1 || camera.width > kLargestSide || camera.height > kLargestSide) {
@@ -245,7 +251,8 @@ void ShadowVolumes::Impl::resize(int width, int height) {
   }
 }
 
-/// Near and far depth stand as close around the visible surfaces as can be told: it is their ratio that costs resolution.
+/// Near and far depth stand as close around the visible surfaces as can be told: it is their ratio that costs
+/// resolution.
 glm::dmat4 ShadowVolumes::Impl::clip_from_world(const VolumeCamera& camera) const {
   const glm::dmat4 view = glm::lookAt(camera.position, camera.target, camera.up);
   double distance = std::numeric_limits<double>::infinity();
@@ -277,8 +284,8 @@ void ShadowVolumes::Impl::draw_visible_depth(const VolumeCamera& camera) {
   ++pass_count_;
 }
 
-/// False when no visible surface can lie in the light that comes through the opening: the light misses the picture's pyramid,
-/// or every surface is on the sun's side of the opening.
+/// False when no visible surface can lie in the light that comes through the opening: the light misses the picture's
+/// pyramid, or every surface is on the sun's side of the opening.
 bool ShadowVolumes::Impl::light_reaches_picture(const Opening& opening, glm::dvec3 direction_to_sun) const {
   const glm::dmat4 rows = glm::transpose(clip_from_world_);
   for (const glm::dvec4& plane : {rows[3] + rows[0], rows[3] - rows[0], rows[3] + rows[1], rows[3] - rows[1]}) {
@@ -298,10 +305,11 @@ bool ShadowVolumes::Impl::light_reaches_picture(const Opening& opening, glm::dve
 
 /// One stencil pass: how many of the volume's casters lie between each visible point and the sun, modulo 256.
 ///
-/// Counted beyond the visible point (z-fail), which stays right with the camera inside a volume: each of the volume's faces
-/// that the depth test hides adds one if it is left through (back) and takes one if it is entered through (front). Depth clamp
-/// keeps the faces that reach beyond the farthest depth. A cap at the very depth of the visible surface fails the test "less"
-/// and so counts as beyond: a lit surface does not shadow itself. [Everitt & Kilgard 2002]
+/// Counted beyond the visible point (z-fail), which stays right with the camera inside a volume: each of the volume's
+/// faces that the depth test hides adds one if it is left through (back) and takes one if it is entered through
+/// (front). Depth clamp keeps the faces that reach beyond the farthest depth; what is nearer than the nearest surface
+/// hides behind none. A cap at the very depth of the visible surface fails the test "less" and so counts as beyond: a
+/// lit surface does not shadow itself. [Everitt & Kilgard 2002]
 std::vector<std::uint8_t> ShadowVolumes::Impl::count_crossings(const VolumeTriangles& volume) {
   gl_.DepthMask(GL_FALSE);
   gl_.Enable(GL_STENCIL_TEST);
@@ -382,7 +390,7 @@ BeamMask ShadowVolumes::Impl::render(const VolumeCamera& camera, glm::dvec3 dire
   for (std::uint8_t& pixel : mask.shadowed) pixel = pixel != 0;
   for (const Opening& opening : openings_) {
     mask.crossings.push_back(light_reaches_picture(opening, sun) ? count(opening.casters)
-                                                                  : std::vector<std::uint8_t>(pixel_count, 0));
+                                                                 : std::vector<std::uint8_t>(pixel_count, 0));
   }
   if (const GLenum error = gl_.GetError(); error != GL_NO_ERROR) {
     camera_.width = 0;
@@ -402,6 +410,8 @@ BeamMask ShadowVolumes::render(const VolumeCamera& camera, glm::dvec3 direction_
   return impl_->render(camera, direction_to_sun);
 }
 
-int ShadowVolumes::pass_count() const { return impl_->pass_count(); }
+int ShadowVolumes::pass_count() const {
+  return impl_->pass_count();
+}
 
 }  // namespace transom

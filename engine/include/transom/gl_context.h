@@ -36,7 +36,8 @@ class GlContext {
   GlContext(const GlContext&) = delete;
   GlContext& operator=(const GlContext&) = delete;
 
-  /// Back end, OpenGL version and renderer, for people: "OSMesa (libOSMesa.so.8), 4.5 (Core Profile) Mesa ..., llvmpipe ...".
+  /// Back end, OpenGL version and renderer, for people: "OSMesa (libOSMesa.so.8), 4.5 (Core Profile) Mesa ..., llvmpipe
+  /// ...".
   const std::string& name() const { return name_; }
   Backend backend() const { return backend_; }
 

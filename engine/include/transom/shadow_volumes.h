@@ -33,18 +33,19 @@ struct BeamMask {
 /// Stencil shadow volumes of a fixed scene, for any camera and any beam of parallel light.
 ///
 /// Both sides of a triangle cast: single sheets, closed solids, any orientation, T-junctions and interpenetration. A
-/// surface never shadows itself. Exact for each pixel's centre but for the depth buffer's resolution (24 bits between the
-/// nearest and the farthest surface): shadow edges stand within a pixel of where rays put them. The stencil counts modulo
-/// 256: exactly 256 sheets, or openings of one group, one behind another would count as none. A closed, consistently
-/// oriented solid counts once for each time that the ray to the sun goes through it, a sheet once.
+/// surface never shadows itself. Exact for each pixel's centre but for the depth buffer's resolution (24 bits between
+/// the nearest and the farthest surface): shadow edges stand within a pixel of where rays put them. Elsewhere about one
+/// pixel in a million is wrong, where the rasteriser gives a volume's side, seen edge-on, no sound depth. The stencil
+/// counts modulo 256: exactly 256 sheets, or openings of one group, one behind another would count as none. A closed,
+/// consistently oriented solid counts once for each time that the ray to the sun goes through it, a sheet once.
 ///
 /// Any thread may use an object, one at a time (see GlContext, which must outlive it and serves any number of objects).
 /// [Crow 1977; Heidmann 1991; Everitt & Kilgard 2002; McGuire et al. 2003]
 class ShadowVolumes {
  public:
-  /// vertices: recentred near the origin, any unit. opaque_triangles and opening_triangles_by_group: indices of vertices;
-  /// glass hides nothing and casts nothing, so it belongs to the openings alone. Triangles without area are ignored.
-  /// Throws InputError for an index out of range or a vertex that is not finite, GlError if OpenGL fails.
+  /// vertices: recentred near the origin, any unit. opaque_triangles and opening_triangles_by_group: indices of
+  /// vertices; glass hides nothing and casts nothing, so it belongs to the openings alone. Triangles without area are
+  /// ignored. Throws InputError for an index out of range or a vertex that is not finite, GlError if OpenGL fails.
   ShadowVolumes(GlContext& context, std::span<const glm::vec3> vertices, std::span<const glm::uvec3> opaque_triangles,
                 std::span<const std::vector<glm::uvec3>> opening_triangles_by_group);
   ~ShadowVolumes();
