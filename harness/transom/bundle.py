@@ -13,6 +13,7 @@ Published references are in the repository (reference/store/); everything else i
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import io
 import json
 import os
@@ -21,6 +22,7 @@ import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -147,7 +149,10 @@ def make_case(
                 value=value,
                 remedy=f"Choose from {', '.join(known)}",
             )
-    return Case(scene, condition, renderer.name, renderer.version, {**known, **options}, view, sensors)
+    version = renderer.version
+    if renderer.name == "engine":
+        version += f"+{_engine_build()}"
+    return Case(scene, condition, renderer.name, version, {**known, **options}, view, sensors)
 
 
 @dataclass(frozen=True)
@@ -311,6 +316,19 @@ def find_bundle(case: Case) -> Bundle | None:
         if bundle is not None:
             return bundle
     return None
+
+
+@cache
+def _engine_build() -> str:
+    """Hash of the engine as it is built here: a rebuilt engine renders again. References declare a version instead,
+    because each costs minutes and does not change with every edit."""
+    digest = hashlib.sha256()
+    for module in ("transom._engine", "transom.engine", "transom.engine_renderer"):
+        found = importlib.util.find_spec(module)
+        if found is None or found.origin is None:
+            raise InputError("is not built", field=module, remedy="Build the engine: make setup")
+        digest.update(Path(found.origin).read_bytes())
+    return digest.hexdigest()[:12]
 
 
 def _array_key(*arrays: NDArray[np.float64]) -> str:

@@ -34,7 +34,8 @@ class SuiteEntry(BaseModel):
     """One suite. target_percent: mean relative standard error at which a published reference is good enough.
 
     width: pictures are this wide and keep their view's proportions; omitted: the view's own size.
-    reference: who knows the truth.
+    reference: who knows the truth. layout: how a report shows it, view by view or as a grid of hours.
+    report: whether the report runs it.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
@@ -44,6 +45,8 @@ class SuiteEntry(BaseModel):
     target_percent: float = Field(default=1.0, gt=0.0)
     width: int | None = Field(default=None, gt=0)
     reference: Literal["mitsuba", "closed_form"] = "mitsuba"
+    layout: Literal["views", "hours"] = "views"
+    report: bool = True
     cases: list[CaseEntry] = Field(min_length=1)
 
 
@@ -75,6 +78,7 @@ class Suite:
     description: str
     target_percent: float
     reference: str
+    layout: str
     cases: tuple[SuiteCase, ...]
 
 
@@ -102,7 +106,9 @@ def load_suite(name: str, path: Path | None = None) -> Suite:
         raise InputError("is not a suite", field="SUITE", value=name, remedy=f"Choose one of {', '.join(suites)}")
     entry = suites[name]
     cases = [case for line in entry.cases for case in _cases(line, entry.width)]
-    return Suite(name, entry.title, entry.description, entry.target_percent, entry.reference, tuple(cases))
+    return Suite(
+        name, entry.title, entry.description, entry.target_percent, entry.reference, entry.layout, tuple(cases)
+    )
 
 
 def choose(entries: Sequence[Named], names: Sequence[str] | None, scene: Scene, kind: str) -> tuple[Named, ...]:

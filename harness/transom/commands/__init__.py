@@ -1,0 +1,1 @@
+"""The subcommands of `transom`, one module each for pictures, sensors, suites, verdicts and lists."""

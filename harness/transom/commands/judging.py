@@ -1,0 +1,64 @@
+"""`transom compare`, `judge` and `report`: the later steps, each from the files of the one before."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+SuiteArgument = Annotated[str, typer.Argument(metavar="SUITE", help="Name of a suite: transom list suites.")]
+BuildOption = Annotated[Path, typer.Option("--build", help="Folder of results.")]
+DEFAULT_BUILD = Path("build")
+
+
+def compare(suite: SuiteArgument, build: BuildOption = DEFAULT_BUILD) -> None:
+    """Compare the finished runs of a suite with their references; renders nothing.
+
+    Writes BUILD/runs/SUITE/comparison.json: numbers with uncertainties, no opinion.
+
+    Example:  transom compare rooms
+    """
+    from transom.workflow import compare_finished, comparison_file
+
+    comparison = compare_finished(suite, build)
+    counts = f"{len(comparison.images)} image regions, {len(comparison.sensors)} sensors"
+    typer.echo(f"{comparison_file(suite, build)}: {counts}, {len(comparison.missing)} missing")
+
+
+def judge(suite: SuiteArgument, build: BuildOption = DEFAULT_BUILD) -> None:
+    """Judge a compared suite by scenes/tolerances.toml; takes seconds.
+
+    Exit code: 4 crash or missing reference, 1 fail, 3 inconclusive, 0 pass.
+
+    Example:  transom judge rooms
+    """
+    from transom.judge import exit_code
+    from transom.workflow import judge_compared, print_verdicts
+
+    verdicts = judge_compared(suite, build)
+    print_verdicts(verdicts)
+    code = exit_code(verdicts)
+    if code:
+        raise typer.Exit(code)
+
+
+def report(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the report.")] = DEFAULT_BUILD / "report",
+    build: BuildOption = DEFAULT_BUILD,
+    rendered: Annotated[
+        bool, typer.Option("--rendered", help="Use the runs that are there; render and time nothing.")
+    ] = False,
+) -> None:
+    """Run every suite, time the engine, and write the report: OUTPUT/index.html and OUTPUT/results.json.
+
+    The page is one file, with its pictures in it. Exit code as of `transom judge`, over all suites.
+
+    Example:  transom report
+    """
+    from transom.report import write_report
+
+    code = write_report(output, build, render=not rendered)
+    typer.echo(f"{output / 'index.html'}")
+    if code:
+        raise typer.Exit(code)

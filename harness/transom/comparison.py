@@ -1,0 +1,146 @@
+"""comparison.json: everything that was measured on a suite, between rendering and judging."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import TypeAdapter, ValidationError
+from scipy import ndimage
+
+from transom.colour import luminance
+from transom.compare import ImageComparison, SensorComparison
+from transom.errors import InputError
+from transom.files import write_atomic
+from transom.judge import Missing, Subject
+from transom.renderer import ImageResult
+from transom.suite import invalid_field
+
+COMPARISON_FORMAT = 1
+
+EXTERIOR_IS_JUDGED = False
+"""Directly seen sky and ground are reported apart; only a tolerance that names them could judge them."""
+
+DISAGREEMENT_SHARE = 0.01
+"""Two visibility methods disagree on a pixel where their luminances differ by more than this share."""
+
+EDGE_SHARE = 0.1
+"""A pixel is at a sun edge where direct sunlight varies by this share of its maximum within 3x3 pixels around it."""
+
+
+@dataclass(frozen=True)
+class MethodAgreement:
+    """Shadow volumes against shadow rays on one view: pixels whose luminances differ by more than 1 %, those of them
+    further than one pixel from an edge of direct sunlight, and the differing share of all pixels [%]."""
+
+    scene: str
+    view: str
+    condition: str
+    pixel_count: int
+    differing_count: int
+    away_from_edges_count: int
+    differing_percent: float
+    away_from_edges_percent: float
+
+
+@dataclass(frozen=True)
+class AnalyticComparison:
+    """One quantity of a scene with a known answer: ours, the truth and its uncertainty, and where the truth is from."""
+
+    scene: str
+    quantity: str
+    unit: str
+    engine: float
+    truth: float
+    truth_uncertainty: float
+    error_percent: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All measurements of one suite."""
+
+    format: int
+    suite: str
+    title: str
+    images: tuple[ImageComparison, ...] = ()
+    sensors: tuple[SensorComparison, ...] = ()
+    agreements: tuple[MethodAgreement, ...] = ()
+    analytic: tuple[AnalyticComparison, ...] = ()
+    missing: tuple[Missing, ...] = ()
+
+    def subjects(self) -> list[Subject]:
+        """What there is to judge. Signed differences; a mean relative error counts as a difference from zero."""
+        found: list[Subject] = []
+        for row in self.images:
+            if row.region == "exterior" and not EXTERIOR_IS_JUDGED:
+                continue
+            place = (row.scene, row.view, row.region, row.condition, row.method, row.reference)
+            batches = row.reference_batch_count
+            error, noise = row.mean_relative_error_percent, row.mean_relative_error_standard_error_percent
+            found.append(Subject("mean_relative_error_percent", *place, error, noise, batch_count=batches))
+            bias, noise = row.bias_percent, row.bias_standard_error_percent
+            found.append(Subject("bias_percent", *place, bias, noise, batch_count=batches))
+        for sensor in self.sensors:
+            place = (sensor.scene, "", sensor.set, sensor.condition, sensor.method, sensor.reference)
+            error, noise = sensor.error_percent, sensor.error_standard_error_percent
+            found.append(Subject("sensor_percent", *place, error, noise, batch_count=sensor.reference_batch_count))
+        for pair in self.agreements:
+            place = (pair.scene, pair.view, "", pair.condition, "volumes", "rays")
+            found.append(Subject("agreement_percent", *place, pair.away_from_edges_percent))
+        for entry in self.analytic:
+            place = (entry.scene, "", entry.quantity, "", "", entry.source)
+            noise = 100 * entry.truth_uncertainty / abs(entry.truth) if entry.truth else 0.0
+            found.append(Subject("analytic_percent", *place, entry.error_percent, noise))
+        return found
+
+
+def compare_methods(scene: str, view: str, condition: str, volumes: ImageResult, rays: ImageResult) -> MethodAgreement:
+    """Agreement of the two visibility methods. Raises ValueError for pictures of different size."""
+    if volumes.mean.shape != rays.mean.shape:
+        raise ValueError(f"pictures of {volumes.mean.shape} and {rays.mean.shape} cannot be compared")
+    ours, theirs = luminance(volumes.mean), luminance(rays.mean)
+    differing = np.abs(ours - theirs) > DISAGREEMENT_SHARE * np.maximum(ours, theirs)
+    away = differing & ~ndimage.binary_dilation(_sun_edges(volumes) | _sun_edges(rays), np.ones((3, 3)))
+    count = differing.size
+    return MethodAgreement(
+        scene=scene,
+        view=view,
+        condition=condition,
+        pixel_count=count,
+        differing_count=int(differing.sum()),
+        away_from_edges_count=int(away.sum()),
+        differing_percent=100 * float(differing.mean()),
+        away_from_edges_percent=100 * float(away.mean()),
+    )
+
+
+def write_comparison(path: Path, comparison: Comparison) -> None:
+    write_atomic(path, TypeAdapter(Comparison).dump_json(comparison, indent=1) + b"\n")
+
+
+def read_comparison(path: Path) -> Comparison:
+    """Raises InputError for a file that is missing or not a comparison of this format."""
+    if not path.is_file():
+        raise InputError("does not exist", file=path, remedy="Compare the suite first: transom compare SUITE")
+    try:
+        comparison = TypeAdapter(Comparison).validate_json(path.read_bytes())
+    except ValidationError as error:
+        raise invalid_field(error, path) from error
+    if comparison.format != COMPARISON_FORMAT:
+        remedy = "Compare the suite again: transom compare SUITE"
+        raise InputError("is of another version", file=path, field="format", value=comparison.format, remedy=remedy)
+    return comparison
+
+
+def _sun_edges(image: ImageResult) -> NDArray[np.bool_]:
+    sun = image.components.get("sun")
+    if sun is None:
+        return np.zeros(image.mean.shape[:2], bool)
+    values = luminance(sun)
+    highest, lowest = ndimage.maximum_filter(values, 3), ndimage.minimum_filter(values, 3)
+    edges: NDArray[np.bool_] = highest - lowest > EDGE_SHARE * highest
+    return edges

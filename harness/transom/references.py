@@ -1,0 +1,60 @@
+"""The published references: rendered once with Mitsuba, kept in the repository (reference/store/)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+from rich.console import Console
+
+from transom.bundle import cache_store, repository_store
+from transom.progress import CaseProgress
+from transom.renderer import load_renderer
+from transom.run import Question, reference_questions, render_case
+from transom.suite import load_suite, read_suites
+
+REFERENCE_RENDERER = "mitsuba"
+
+STAGES = (4.0, 2.0, 1.0)
+"""Multiples of the wanted noise, in the order in which all cases are brought to them."""
+
+
+def published_questions(scenes: Collection[str] = ()) -> list[Question]:
+    """Every reference that reports need, each once, over all suites that are judged against Mitsuba."""
+    renderer = load_renderer(REFERENCE_RENDERER)
+    questions: dict[str, Question] = {}
+    for name, entry in read_suites().items():
+        if entry.reference != REFERENCE_RENDERER:
+            continue
+        for question in reference_questions(load_suite(name), renderer, {}):
+            known = questions.get(question.case.key)
+            if (not scenes or question.case.scene.name in scenes) and (known is None or _stricter(question, known)):
+                questions[question.case.key] = question
+    return list(questions.values())
+
+
+def run_references(scenes: Collection[str], *, fresh: bool = False) -> None:
+    """Renders what is missing or too noisy into the repository's store; stopped, it goes on where it was.
+
+    It goes over all cases in stages, each twice as quiet as the one before: stopped early, every case has a reference.
+    """
+    renderer = load_renderer(REFERENCE_RENDERER)
+    questions = published_questions(scenes)
+    store = repository_store()
+    with CaseProgress(len(questions) * len(STAGES), Console(stderr=True)) as bars:
+        for stage, question in ((stage, question) for stage in STAGES for question in questions):
+            target = replace(question.target, percent=stage * question.target.percent) if question.target else None
+            bars.begin(f"{question.case.label} to {target.percent if target else 0:g} %")
+            is_fresh = fresh and stage == STAGES[0]
+            bundle = render_case(
+                renderer, Question(question.case, target), store, bars.update, fresh=is_fresh, keep_batches=True
+            )
+            facts, size = bundle.record.facts, sum(file.bytes for file in bundle.record.files.values())
+            noise = float(facts["relative_standard_error_percent"])
+            bars.finish(f"has {noise:.3f} %, {facts['batches']} batches, {size / 1e6:.2f} MB")
+    for question in questions:
+        cache_store().drop_batches(question.case)
+
+
+def _stricter(question: Question, known: Question) -> bool:
+    return question.target is not None and (known.target is None or question.target.percent < known.target.percent)

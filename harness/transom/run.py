@@ -1,0 +1,212 @@
+"""Running cases: looks an answer up, else renders it, resumably, until a reference is as quiet as was asked for."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transom.bundle import BatchStore, Bundle, Case, Store, cache_store, find_bundle, make_case
+from transom.colour import luminance
+from transom.errors import InputError
+from transom.noise import mean_relative_standard_error
+from transom.renderer import ImageResult, Progress, Renderer, SensorResult
+from transom.scene.model import Scene, View
+from transom.sensor_file import SensorTable, scene_sensors
+from transom.suite import Suite
+from transom.visible import first_surfaces
+
+SENSOR_TARGET_PERCENT = 0.2
+"""Standard error of a published illuminance, relative to it (median over a scene's sensors)."""
+
+LEAST_BATCHES = 32
+"""Published references have at least so many batches, so that Student's quantile stays near the normal one."""
+
+GREATEST_GROWTH = 4.0
+"""A noise estimate from few batches is not trusted to order more than this many times what was rendered."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """When a reference is good enough: relative standard error in percent, within so many batches."""
+
+    percent: float
+    max_batches: int = 4096
+
+
+@dataclass(frozen=True)
+class Question:
+    """One case and, for a reference, how well it is to be answered."""
+
+    case: Case
+    target: Target | None = None
+
+
+def render_case(
+    renderer: Renderer,
+    question: Question,
+    store: Store | None = None,
+    progress: Progress | None = None,
+    *,
+    fresh: bool = False,
+    keep_batches: bool = False,
+) -> Bundle:
+    """The bundle of a case: found in the repository or the cache, else rendered and written to `store` (the cache).
+
+    fresh: render again even when an answer exists. A reference that has batches is resumed where it was stopped;
+    keep_batches: so that it can be made quieter later.
+    """
+    case, store = question.case, store or cache_store()
+    found = None if fresh else store.find(case) or find_bundle(case)
+    if found is not None and _is_good_enough(found, question):
+        return found
+    if fresh:
+        cache_store().drop_batches(case)
+    # The time of a reference counts from its first batch on.
+    started = time.perf_counter() - (found.record.wall_seconds if found is not None else 0.0)
+    if "batches" in renderer.default_options():
+        bundle = _render_in_batches(renderer, question, store, progress, started, keep_batches)
+    elif case.view is not None:
+        image = renderer.render(case.scene, case.condition, case.view, case.options, progress)
+        facts, trace = _without_trace(image.facts)
+        seconds = time.perf_counter() - started
+        bundle = store.write(case, image=image, facts=facts, trace=trace, wall_seconds=seconds, half=False)
+    else:
+        table, facts = _measure(renderer, case, case.options, progress)
+        bundle = store.write(case, sensors=table, facts=facts, wall_seconds=time.perf_counter() - started)
+    return bundle
+
+
+def reference_questions(suite: Suite, renderer: Renderer, options: Mapping[str, Any]) -> Iterator[Question]:
+    """The references of a suite: sensors first (they are cheap), then the views."""
+    for entry in suite.cases:
+        table = scene_sensors(entry.scene) if entry.sensors else None
+        if table is not None:
+            case = make_case(entry.scene, entry.condition, renderer, options, sensors=table)
+            yield Question(case, Target(SENSOR_TARGET_PERCENT))
+    for entry in suite.cases:
+        for view in entry.views:
+            case = make_case(entry.scene, entry.condition, renderer, options, view=view)
+            yield Question(case, Target(suite.target_percent))
+
+
+def engine_questions(suite: Suite, renderer: Renderer, visibilities: tuple[str, ...]) -> Iterator[Question]:
+    """The engine's cases of a suite: every view by every visibility method, and every scene's sensors."""
+    for entry in suite.cases:
+        table = scene_sensors(entry.scene) if entry.sensors else None
+        if table is not None:
+            yield Question(make_case(entry.scene, entry.condition, renderer, {}, sensors=table))
+        for view in entry.views:
+            for visibility in visibilities:
+                options = {"visibility": visibility}
+                yield Question(make_case(entry.scene, entry.condition, renderer, options, view=view))
+
+
+def achieved_percent(bundle: Bundle, scene: Scene, view: View | None) -> float:
+    """Relative standard error of a reference [%]: mean over interior pixels, or median over sensors."""
+    if view is not None:
+        return _image_percent(bundle.image(), scene, view)
+    return _sensor_percent(bundle.sensors())
+
+
+def _is_good_enough(bundle: Bundle, question: Question) -> bool:
+    if question.target is None:
+        return True
+    # 2 % of slack: a second estimate of the same noise differs a little from the one that stopped the rendering.
+    return float(bundle.record.facts.get("relative_standard_error_percent", 0.0)) <= 1.02 * question.target.percent
+
+
+def _render_in_batches(
+    renderer: Renderer,
+    question: Question,
+    store: Store,
+    progress: Progress | None,
+    started: float,
+    keep_batches: bool,
+) -> Bundle:
+    """Renders, estimates the noise, orders as many batches as the target needs, until it is met."""
+    case, target = question.case, question.target
+    batches = cache_store().batches(case)
+    count = max(int(case.options["batches"]), LEAST_BATCHES if target else 2)
+    resumed = sum(1 for index in range(count) if batches.has(index))
+    image: ImageResult | None = None
+    table: SensorTable | None = None
+    while True:
+        options = {**case.options, "batches": count}
+        if case.view is not None:
+            image, facts = _picture(renderer, case, options, batches, progress)
+            percent = _image_percent(image, case.scene, case.view)
+        else:
+            table, facts = _measure(renderer, case, options, progress, batches)
+            percent = _sensor_percent(table)
+        if target is None or percent <= target.percent or count >= target.max_batches:
+            break
+        growth = min(1.02 * (percent / target.percent) ** 2, GREATEST_GROWTH)
+        count = min(max(count + 2, math.ceil(count * growth / 2) * 2), target.max_batches)
+    facts = {**facts, "relative_standard_error_percent": round(percent, 5), "batches": count}
+    if resumed:
+        facts["batches_resumed"] = resumed
+    case = replace(case, options={**case.options, "batches": count})
+    seconds = time.perf_counter() - started
+    bundle = store.write(case, image=image, sensors=table, facts=facts, wall_seconds=seconds)
+    if not keep_batches:
+        cache_store().drop_batches(case)
+    return bundle
+
+
+def _picture(
+    renderer: Renderer, case: Case, options: Mapping[str, Any], batches: BatchStore, progress: Progress | None
+) -> tuple[ImageResult, dict[str, Any]]:
+    render: Any = renderer.render
+    image: ImageResult = render(case.scene, case.condition, case.view, options, progress, batches=batches)
+    return image, dict(image.facts)
+
+
+def _measure(
+    renderer: Renderer,
+    case: Case,
+    options: Mapping[str, Any],
+    progress: Progress | None,
+    batches: BatchStore | None = None,
+) -> tuple[SensorTable, dict[str, Any]]:
+    if case.sensors is None:
+        raise ValueError("the case has no sensors")
+    measure: Any = renderer.illuminance
+    extra = {} if batches is None else {"batches": batches}
+    points, normals = case.sensors.points, case.sensors.normals
+    result: SensorResult = measure(case.scene, case.condition, points, normals, options, progress, **extra)
+    table = case.sensors.measured(np.asarray(luminance(result.illuminance), np.float64), result.standard_error)
+    return table, dict(result.facts)
+
+
+def _image_percent(image: ImageResult, scene: Scene, view: View) -> float:
+    surfaces = first_surfaces(scene, view)
+    mask: NDArray[np.bool_] = surfaces.interior if surfaces.interior.any() else np.ones_like(surfaces.interior)
+    return 100 * mean_relative_standard_error(image, mask)
+
+
+def _sensor_percent(table: SensorTable) -> float:
+    """Median over the sensors, since one in the dark may not decide."""
+    if table.illuminance is None or table.standard_error is None:
+        raise InputError("holds no measured illuminance", field="sensors")
+    lit = table.illuminance > 0
+    return 100 * float(np.median(table.standard_error[lit] / table.illuminance[lit])) if lit.any() else 0.0
+
+
+def _without_trace(facts: Mapping[str, Any]) -> tuple[dict[str, Any], Mapping[str, Any] | None]:
+    """Facts for run.json, and the phases (name, begin, end) [s] as a trace file that Perfetto opens."""
+    plain = dict(facts)
+    phases = plain.pop("trace", None)
+    if not phases:
+        return plain, None
+    origin = min(begin for _, begin, _ in phases)
+    events = [
+        {"name": name, "ph": "X", "pid": 1, "tid": 1, "ts": 1e6 * (begin - origin), "dur": 1e6 * (end - begin)}
+        for name, begin, end in phases
+    ]
+    return plain, {"traceEvents": events, "displayTimeUnit": "ms"}

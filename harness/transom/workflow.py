@@ -1,0 +1,235 @@
+"""The steps of a suite with files in between: render -> run bundles -> compare -> judge. Each can run again alone."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pydantic import TypeAdapter
+from rich.console import Console
+from rich.table import Table
+
+from transom.bundle import Bundle, find_bundle, make_case
+from transom.compare import CaseNames, ImageComparison, SensorComparison, compare_images, compare_sensors
+from transom.comparison import (
+    COMPARISON_FORMAT,
+    Comparison,
+    MethodAgreement,
+    compare_methods,
+    read_comparison,
+    write_comparison,
+)
+from transom.errors import InputError
+from transom.files import write_atomic
+from transom.judge import Missing, Outcome, Verdict, exit_code, judge, read_tolerances
+from transom.known_answers import compare_known_answers
+from transom.progress import CaseProgress
+from transom.renderer import Renderer, load_renderer
+from transom.run import Question, engine_questions, render_case
+from transom.scene import scene_root
+from transom.scene.model import View
+from transom.sensor_file import scene_sensors
+from transom.suite import Suite, SuiteCase, load_suite
+from transom.visible import first_surfaces, region_pixels
+
+VISIBILITIES = ("volumes", "rays")
+ENGINE = "engine"
+
+LOG_WIDTH = 160
+"""Columns of tables that go to a file."""
+
+
+@dataclass(frozen=True)
+class Crash:
+    """A case whose renderer failed, and its error."""
+
+    question: Question
+    message: str
+
+
+def comparison_file(suite: str, build: Path) -> Path:
+    return build / "runs" / suite / "comparison.json"
+
+
+def verdicts_file(suite: str, build: Path) -> Path:
+    return build / "runs" / suite / "verdicts.json"
+
+
+def run_suite(name: str, scenes: Collection[str], build: Path = Path("build"), *, fresh: bool = False) -> int:
+    """Renders, compares, judges and prints; the exit code of the verdicts."""
+    suite = chosen(load_suite(name), scenes)
+    compare_suite(suite, build, render_suite(suite, fresh=fresh))
+    verdicts = judge_compared(name, build)
+    print_verdicts(verdicts)
+    return exit_code(verdicts)
+
+
+def chosen(suite: Suite, scenes: Collection[str]) -> Suite:
+    """The suite's cases of some scenes (none given: all). Raises InputError when none is left."""
+    cases = tuple(case for case in suite.cases if not scenes or case.scene.name in scenes)
+    if not cases:
+        raise InputError(f"is no scene of suite {suite.name}", field="--scene", value=", ".join(sorted(scenes)))
+    return replace(suite, cases=cases)
+
+
+def render_suite(suite: Suite, *, fresh: bool = False) -> list[Crash]:
+    """Renders with the engine what is not there yet. A case that fails does not stop the others."""
+    if suite.reference == "closed_form":
+        return []
+    renderer = load_renderer(ENGINE)
+    questions = list(engine_questions(suite, renderer, VISIBILITIES))
+    crashes: list[Crash] = []
+    with CaseProgress(len(questions), Console(stderr=True)) as bars:
+        for question in questions:
+            bars.begin(question.case.label + "-" + str(question.case.options.get("visibility", "")))
+            try:
+                bundle = render_case(renderer, question, progress=bars.update, fresh=fresh)
+            except InputError:
+                raise
+            except Exception as error:
+                crashes.append(Crash(question, "".join(traceback.format_exception_only(error)).strip()))
+                bars.finish(f"crashed: {crashes[-1].message}")
+            else:
+                bars.finish(f"{bundle.record.wall_seconds:.1f} s")
+    return crashes
+
+
+def compare_finished(name: str, build: Path) -> Comparison:
+    """Compares what has been rendered of a suite."""
+    return compare_suite(load_suite(name), build, [])
+
+
+def compare_suite(suite: Suite, build: Path, crashes: Collection[Crash]) -> Comparison:
+    """Compares every case with its reference and writes comparison.json."""
+    if suite.reference == "closed_form":
+        comparison = Comparison(COMPARISON_FORMAT, suite.name, suite.title, analytic=compare_known_answers(suite))
+    else:
+        comparison = _compare_with_mitsuba(suite, {crash.question.case.key: crash.message for crash in crashes})
+    write_comparison(comparison_file(suite.name, build), comparison)
+    return comparison
+
+
+def judge_compared(name: str, build: Path) -> list[Verdict]:
+    """Judges comparison.json by the tolerances and writes verdicts.json."""
+    comparison = read_comparison(comparison_file(name, build))
+    verdicts = judge(comparison.subjects(), comparison.missing, read_tolerances(scene_root() / "tolerances.toml"))
+    path = verdicts_file(name, build)
+    write_atomic(path, TypeAdapter(list[Verdict]).dump_json(verdicts, indent=1) + b"\n")
+    return verdicts
+
+
+def print_verdicts(verdicts: Collection[Verdict]) -> None:
+    """A table on standard output: what did not pass first. Sensors that passed are only counted."""
+    order = list(reversed(Outcome))
+    table = Table("verdict", "quantity", "case", "difference %", "k u %", "tolerance %", box=None)
+    for verdict in sorted(verdicts, key=lambda entry: order.index(entry.outcome)):
+        if verdict.outcome is Outcome.PASS and verdict.quantity == "sensor_percent":
+            continue
+        case = " ".join(part for part in _place(verdict) if part)
+        numbers = (verdict.difference, verdict.expanded_uncertainty, verdict.tolerance)
+        cells = ["" if number is None else f"{number:.3g}" for number in numbers]
+        table.add_row(verdict.outcome, verdict.quantity or verdict.reason, case, *cells)
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=LOG_WIDTH)
+    console.print(table)
+    counts = {outcome: sum(verdict.outcome is outcome for verdict in verdicts) for outcome in Outcome}
+    console.print(", ".join(f"{count} {outcome}" for outcome, count in counts.items() if count) or "nothing judged")
+
+
+@dataclass
+class _Found:
+    """Comparisons of a suite as they are made."""
+
+    images: list[ImageComparison]
+    sensors: list[SensorComparison]
+    agreements: list[MethodAgreement]
+    missing: list[Missing]
+
+
+def _compare_with_mitsuba(suite: Suite, crashed: Mapping[str, str]) -> Comparison:
+    engine, mitsuba = load_renderer(ENGINE), load_renderer("mitsuba")
+    found = _Found([], [], [], [])
+    for entry in suite.cases:
+        if entry.sensors:
+            _compare_sensors(entry, engine, mitsuba, crashed, found)
+        for view in entry.views:
+            _compare_view(entry, view, engine, mitsuba, crashed, found)
+    return Comparison(
+        COMPARISON_FORMAT,
+        suite.name,
+        suite.title,
+        images=tuple(found.images),
+        sensors=tuple(found.sensors),
+        agreements=tuple(found.agreements),
+        missing=tuple(found.missing),
+    )
+
+
+def _compare_view(
+    entry: SuiteCase, view: View, engine: Renderer, mitsuba: Renderer, crashed: Mapping[str, str], found: _Found
+) -> None:
+    scene, condition = entry.scene, entry.condition
+    truth = find_bundle(make_case(scene, condition, mitsuba, {}, view=view))
+    if truth is None:
+        found.missing.append(_no_reference(entry, view.name))
+    rendered: dict[str, Bundle] = {}
+    for visibility in VISIBILITIES:
+        case = make_case(scene, condition, engine, {"visibility": visibility}, view=view)
+        ours = find_bundle(case)
+        if ours is None or case.key in crashed:
+            message = crashed.get(case.key, "not rendered: transom run " + ENGINE)
+            found.missing.append(Missing(Outcome.CRASHED, scene.name, view.name, condition.name, visibility, message))
+            continue
+        rendered[visibility] = ours
+    if truth is not None and rendered:
+        surfaces = first_surfaces(scene, view)
+        regions = {region.name: region_pixels(scene, region, surfaces) for region in scene.regions}
+        reference = truth.image()
+        for visibility, bundle in rendered.items():
+            names = _names(entry, view.name, visibility, bundle, truth)
+            found.images += compare_images(bundle.image(), reference, surfaces.interior, regions, names)
+    if len(rendered) == len(VISIBILITIES):
+        pair = [rendered[visibility].image() for visibility in VISIBILITIES]
+        found.agreements.append(compare_methods(scene.name, view.name, condition.name, pair[0], pair[1]))
+
+
+def _compare_sensors(
+    entry: SuiteCase, engine: Renderer, mitsuba: Renderer, crashed: Mapping[str, str], found: _Found
+) -> None:
+    scene, condition = entry.scene, entry.condition
+    table = scene_sensors(scene)
+    case = make_case(scene, condition, engine, {}, sensors=table)
+    ours, truth = find_bundle(case), find_bundle(make_case(scene, condition, mitsuba, {}, sensors=table))
+    if truth is None:
+        found.missing.append(_no_reference(entry, "sensors"))
+    if ours is None or case.key in crashed:
+        message = crashed.get(case.key, "not measured")
+        found.missing.append(Missing(Outcome.CRASHED, scene.name, "sensors", condition.name, ENGINE, message))
+    elif truth is not None:
+        names = _names(entry, "", "rays", ours, truth)
+        found.sensors += compare_sensors(ours.sensors(), truth.sensors(), names)
+
+
+def _names(entry: SuiteCase, view: str, method: str, ours: Bundle, truth: Bundle) -> CaseNames:
+    return CaseNames(
+        scene=entry.scene.name,
+        condition=entry.condition.name,
+        method=method,
+        reference=str(truth.record.inputs["renderer"]),
+        view=view,
+        engine_key=ours.record.key,
+        reference_key=truth.record.key,
+        reference_batch_count=int(truth.record.facts.get("batches", 0)),
+    )
+
+
+def _no_reference(entry: SuiteCase, view: str) -> Missing:
+    message = "no reference: transom run references"
+    return Missing(Outcome.NO_REFERENCE, entry.scene.name, view, entry.condition.name, "", message)
+
+
+def _place(verdict: Verdict) -> tuple[str, ...]:
+    return (verdict.scene, verdict.view, verdict.region, verdict.condition, verdict.method)
