@@ -6,8 +6,8 @@ Exit codes, highest wins: 4 crash or missing reference, 2 wrong use, 1 fail, 3 i
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 
-import click
 import typer
 
 from transom.commands import judging, listing, picture, running, sensing
@@ -21,23 +21,27 @@ app = typer.Typer(
     name="transom",
     help=(
         "Daylight in building interiors: an interactive engine, and references that say how wrong it is.\n\n"
-        "Start with:  transom list scenes\n\n"
+        "\b\n"
+        "Start with:  transom list scenes\n"
         "Then:        transom render test_room -o room.png"
     ),
-    no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
-app.command("render")(picture.render)
-app.command("sensors")(sensing.sensors)
-app.command("run")(running.run)
-app.command("compare")(judging.compare)
-app.command("judge")(judging.judge)
-app.command("report")(judging.report)
-app.command("list")(listing.list_names)
-app.command("doctor")(listing.doctor)
+COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
+    "render": (picture.render, "One picture of a scene, as .exr or .png."),
+    "sensors": (sensing.sensors, "Illuminance at points, as .csv."),
+    "run": (running.run, "Render, compare and judge a suite; or the references."),
+    "compare": (judging.compare, "Compare a suite's runs with their references."),
+    "judge": (judging.judge, "Judge a compared suite by the tolerances."),
+    "report": (judging.report, "Run and time everything; write the report."),
+    "list": (listing.list_names, "List scenes, views, suites or products."),
+    "doctor": (listing.doctor, "Say what the set-up looks like."),
+}
+for name, (function, summary) in COMMANDS.items():
+    app.command(name, short_help=summary)(function)
 
 
 def main() -> None:
@@ -46,23 +50,18 @@ def main() -> None:
 
 
 def run_command(arguments: list[str]) -> int:
-    """Runs the command and gives its exit code."""
+    """Runs the command and gives its exit code. Without arguments it shows the help."""
     try:
-        code = app(arguments, prog_name="transom", standalone_mode=False)
+        code = app(arguments or ["--help"], prog_name="transom", standalone_mode=False)
     except InputError as error:
         print(f"transom: {error}", file=sys.stderr)
         return WRONG_USE
-    except click.exceptions.NoArgsIsHelpError as error:
-        print(error.format_message())
+    except typer.TyperException as error:
+        message = " ".join(str(error.format_message()).split())
+        command = ["transom", *(word for word in arguments[:1] if word in COMMANDS)]
+        print(f"transom: {message} See {' '.join(command)} --help.", file=sys.stderr)
         return WRONG_USE
-    except click.UsageError as error:
-        hint = error.ctx.command_path if error.ctx else "transom"
-        print(f"transom: {error.format_message()} See {hint} --help.", file=sys.stderr)
-        return WRONG_USE
-    except click.ClickException as error:
-        print(f"transom: {error.format_message()}", file=sys.stderr)
-        return WRONG_USE
-    except (click.exceptions.Abort, KeyboardInterrupt):
+    except (typer.Abort, KeyboardInterrupt):
         print("transom: stopped. What is finished is kept: run the same command to go on.", file=sys.stderr)
         return STOPPED
     return code if isinstance(code, int) else 0

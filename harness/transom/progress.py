@@ -61,7 +61,9 @@ class CaseProgress:
             self._print(text)
 
     def _print(self, text: str) -> None:
-        self.console.print(f"[{self.done_cases}/{self.total_cases}] {text}", highlight=False, markup=False)
+        self.console.print(
+            f"[{self.done_cases}/{self.total_cases}] {text}", highlight=False, markup=False, soft_wrap=True
+        )
 
     def __enter__(self) -> CaseProgress:
         self._bars.start()

@@ -17,6 +17,7 @@ def compare(suite: SuiteArgument, build: BuildOption = DEFAULT_BUILD) -> None:
 
     Writes BUILD/runs/SUITE/comparison.json: numbers with uncertainties, no opinion.
 
+    \b
     Example:  transom compare rooms
     """
     from transom.workflow import compare_finished, comparison_file
@@ -31,6 +32,7 @@ def judge(suite: SuiteArgument, build: BuildOption = DEFAULT_BUILD) -> None:
 
     Exit code: 4 crash or missing reference, 1 fail, 3 inconclusive, 0 pass.
 
+    \b
     Example:  transom judge rooms
     """
     from transom.judge import exit_code
@@ -54,6 +56,7 @@ def report(
 
     The page is one file, with its pictures in it. Exit code as of `transom judge`, over all suites.
 
+    \b
     Example:  transom report
     """
     from transom.report import write_report

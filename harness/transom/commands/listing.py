@@ -28,6 +28,7 @@ def list_names(
 ) -> None:
     """List scenes, views (with conditions, regions and sensors), suites, or glazing products.
 
+    \b
     Example:  transom list views partition_office
     """
     lines = {Kind.scenes: _scenes, Kind.suites: _suites, Kind.products: _products}
@@ -38,6 +39,7 @@ def list_names(
 def doctor() -> None:
     """Versions, tools, processor, GL and LLVM back ends, and what to do about each thing that is wrong.
 
+    \b
     Example:  transom doctor
     """
     from transom.doctor import print_report

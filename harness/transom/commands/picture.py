@@ -39,6 +39,7 @@ def render(
 ) -> None:
     """Render a picture: radiance in cd/m² (.exr), or toned on the view's fixed scale (.png).
 
+    \b
     Example:  transom render desk_office --time 2026-06-21T12:00 --sky clear --size 640x480 -o office.exr
     """
     from transom.bundle import make_case

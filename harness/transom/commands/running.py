@@ -21,6 +21,7 @@ def run(
     `transom run references` renders the published references of all suites into reference/store/: hours of work,
     done once; stopped and started again it goes on where it was.
 
+    \b
     Example:  transom run rooms
     """
     from transom.references import run_references

@@ -28,6 +28,7 @@ def sensors(
 
     Writes x,y,z,nx,ny,nz,illuminance_lx,standard_error_lx (and the set's name first, for a scene's own sensors).
 
+    \b
     Example:  transom sensors desk_office --sky overcast -o desks.csv
     """
     from transom.bundle import make_case
