@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <glm/ext/matrix_clip_space.hpp>
-#include <glm/ext/matrix_transform.hpp>
 #include <glm/gtc/type_ptr.hpp>
 #include <limits>
 #include <numbers>
@@ -18,15 +16,13 @@
 
 #include "shadow_casters.h"
 #include "transom/error.h"
+#include "volume_projection.h"
 
 namespace transom {
 
 namespace {
 
 constexpr int kLargestSide = 4096;  // pixels
-
-/// Nearest depth drawn in proportion to the farthest, if a surface is closer than that: what 24 bits can carry.
-constexpr double kNearestDepthShare = 1e-4;
 
 /// Volumes are drawn a little farther away than the surfaces, so that a surface stays in front of the sides of its own
 /// volume when the sun grazes it: a share of the depth's slope (corners snap to 1/256 pixel) and steps of the depth
@@ -39,8 +35,8 @@ layout(location = 0) in vec4 position;  // w = 0: a direction, the point at infi
 uniform mat4 clip_from_world;
 void main() {
   gl_Position = clip_from_world * position;
-  // Depth clamp is wanted beyond the farthest depth only. Before the nearest one it would divide by a w of almost nothing,
-  // and the depth interpolated across such a triangle is noise.
+  // Depth clamp is wanted beyond the farthest depth only. Nearer than the nearest one it would divide by a w of almost
+  // nothing, and the depth interpolated across such a triangle is noise.
   gl_ClipDistance[0] = gl_Position.z + gl_Position.w;
 }
 )";
@@ -93,23 +89,6 @@ void check_camera(const VolumeCamera& camera) {
   }
 }
 
-/// Distance from a point to a triangle. [Ericson 2005, Real-Time Collision Detection, 5.1.5]
-double triangle_distance(glm::dvec3 point, glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) {
-  const auto to_segment = [&](glm::dvec3 from, glm::dvec3 to) {
-    const glm::dvec3 along = to - from;
-    const double length_squared = glm::dot(along, along);
-    const double t = length_squared > 0 ? std::clamp(glm::dot(point - from, along) / length_squared, 0.0, 1.0) : 0.0;
-    return glm::distance(point, from + t * along);
-  };
-  const glm::dvec3 normal = glm::cross(b - a, c - a);
-  const double area_squared = glm::dot(normal, normal);
-  if (area_squared > 0 && glm::dot(glm::cross(b - a, point - a), normal) >= 0 &&
-      glm::dot(glm::cross(c - b, point - b), normal) >= 0 && glm::dot(glm::cross(a - c, point - c), normal) >= 0) {
-    return std::abs(glm::dot(point - a, normal)) / std::sqrt(area_squared);
-  }
-  return std::min({to_segment(a, b), to_segment(b, c), to_segment(c, a)});
-}
-
 }  // namespace
 
 class ShadowVolumes::Impl {
@@ -132,7 +111,6 @@ class ShadowVolumes::Impl {
   void create_objects();
   void delete_objects();
   void resize(int width, int height);
-  glm::dmat4 clip_from_world(const VolumeCamera& camera) const;
   void draw_visible_depth(const VolumeCamera& camera);
   bool light_reaches_picture(const Opening& opening, glm::dvec3 direction_to_sun) const;
   std::vector<std::uint8_t> count_crossings(const VolumeTriangles& volume);
@@ -251,29 +229,9 @@ void ShadowVolumes::Impl::resize(int width, int height) {
   }
 }
 
-/// Near and far depth stand as close around the visible surfaces as can be told: it is their ratio that costs
-/// resolution.
-glm::dmat4 ShadowVolumes::Impl::clip_from_world(const VolumeCamera& camera) const {
-  const glm::dmat4 view = glm::lookAt(camera.position, camera.target, camera.up);
-  double distance = std::numeric_limits<double>::infinity();
-  double farthest = 0;
-  for (const glm::uvec3& t : opaque_triangles_) {
-    const std::array<glm::dvec3, 3> corner{vertices_[t.x], vertices_[t.y], vertices_[t.z]};
-    distance = std::min(distance, triangle_distance(camera.position, corner[0], corner[1], corner[2]));
-    for (const glm::dvec3& point : corner) farthest = std::max(farthest, -(view * glm::dvec4(point, 1)).z);
-  }
-  if (!(farthest > 0)) farthest = 1;  // nothing before the camera
-  farthest *= 1.001;
-  const double aspect = static_cast<double>(camera.width) / camera.height;
-  const double half_height = std::tan(camera.vertical_fov_rad / 2);
-  const double corner_cosine = 1 / std::sqrt(1 + half_height * half_height * (1 + aspect * aspect));
-  const double nearest = std::clamp(0.99 * distance * corner_cosine, kNearestDepthShare * farthest, 0.5 * farthest);
-  return glm::perspective(camera.vertical_fov_rad, aspect, nearest, farthest) * view;
-}
-
 /// Base pass: depth of the surfaces seen through each pixel's centre. Glass writes none.
 void ShadowVolumes::Impl::draw_visible_depth(const VolumeCamera& camera) {
-  clip_from_world_ = clip_from_world(camera);
+  clip_from_world_ = volume_clip_from_world(camera, vertices_, opaque_triangles_);
   gl_.UniformMatrix4fv(clip_from_world_location_, 1, GL_FALSE, glm::value_ptr(glm::mat4(clip_from_world_)));
   gl_.DepthMask(GL_TRUE);
   gl_.Disable(GL_STENCIL_TEST);
