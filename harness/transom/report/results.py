@@ -20,6 +20,8 @@ from transom.timing import Timing
 
 RESULTS_FORMAT = 1
 
+SCHEMA_FILE = Path(__file__).resolve().parents[3] / "reports" / "results.schema.json"
+
 
 class Judged(BaseModel):
     """What is added to each compared quantity: its suite, and its verdict where a tolerance names it."""
@@ -112,6 +114,11 @@ def results_schema() -> str:
     """The JSON schema of results.json, as kept in reports/results.schema.json."""
     schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Results.model_json_schema()}
     return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
+
+
+def write_schema() -> None:
+    """Writes reports/results.schema.json anew, after a change to what results hold."""
+    write_atomic(SCHEMA_FILE, results_schema())
 
 
 def _verdict_place(verdict: Verdict) -> tuple[str, ...]:

@@ -1,0 +1,282 @@
+"""The report from end to end with fake renderers: one offline page, one JSON file, from the same numbers."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from harness_fakes import NoisyRenderer, grey, small_scene
+from numpy.typing import NDArray
+
+from transom.bundle import repository_store
+from transom.daylight.condition import Condition
+from transom.figures import DIFFERENCE_SCALE, LUMINANCE_SCALE, TimingBar, false_colour_png, scale_svg, timings_svg
+from transom.images import tone_mapped
+from transom.renderer import ImageResult, Progress, SensorResult
+from transom.report import write_report
+from transom.report.numbers import fixed, rounded, seconds, signed
+from transom.report.results import SCHEMA_FILE, Results, results_schema
+from transom.run import reference_questions, render_case
+from transom.scene.model import Scene, View
+from transom.suite import load_suite
+from transom.timing import Timing, write_timings
+from transom.visible import FirstSurfaces
+
+SUITES = """
+format = 1
+[suites.rooms]
+title = "Rooms"
+target_percent = 5.0
+cases = [{ scene = "small", views = ["*"] }]
+[suites.hours]
+title = "Hours"
+layout = "hours"
+width = 6
+target_percent = 9.0
+cases = [{ scene = "small", sensors = false }]
+"""
+
+TOLERANCES = """
+format = 1
+[[tolerances]]
+quantity = "mean_relative_error_percent"
+tolerance = 8.0
+reason = "stated"
+[[tolerances]]
+quantity = "bias_percent"
+tolerance = 3.0
+reason = "stated"
+[[tolerances]]
+quantity = "sensor_percent"
+tolerance = 3.0
+reason = "stated"
+"""
+
+
+class FakeEngine:
+    """An engine that is `error` too bright everywhere, and crashes on request."""
+
+    name = "engine"
+    version = "fake"
+    error = 0.01
+    crashes = False
+
+    def default_options(self) -> dict[str, Any]:
+        return {"visibility": "rays"}
+
+    def render(
+        self,
+        scene: Scene,  # noqa: ARG002
+        condition: Condition,  # noqa: ARG002
+        view: View,
+        options: Mapping[str, Any],  # noqa: ARG002
+        progress: Progress | None = None,  # noqa: ARG002
+    ) -> ImageResult:
+        if self.crashes:
+            raise RuntimeError("the fake engine was asked to crash")
+        picture = grey(np.full((view.height, view.width), 100 * (1 + self.error)))
+        return ImageResult(picture, components={"sun": 0.25 * picture, "sky": 0.75 * picture})
+
+    def illuminance(
+        self,
+        scene: Scene,  # noqa: ARG002
+        condition: Condition,  # noqa: ARG002
+        points: NDArray[np.float64],
+        normals: NDArray[np.float64],  # noqa: ARG002
+        options: Mapping[str, Any],  # noqa: ARG002
+        progress: Progress | None = None,  # noqa: ARG002
+    ) -> SensorResult:
+        return SensorResult(np.full((len(points), 3), 100 * (1 + self.error)), np.zeros(len(points)))
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A project of one small scene, with fake renderers and timings."""
+    scenes = tmp_path / "scenes"
+    scenes.mkdir()
+    (scenes / "suites.toml").write_text(SUITES)
+    (scenes / "tolerances.toml").write_text(TOLERANCES)
+    renderers = {"engine": FakeEngine(), "mitsuba": NoisyRenderer(relative_noise=0.02)}
+
+    def surfaces(_: Scene, view: View) -> FirstSurfaces:
+        shape = (view.height, view.width)
+        interior = np.ones(shape, bool)
+        interior[0] = False
+        return FirstSurfaces(np.where(interior, 0, -1).astype(np.int32), np.zeros((*shape, 3), np.float32), interior)
+
+    monkeypatch.setattr("transom.bundle._engine_build", lambda: "fake")
+    monkeypatch.setattr("transom.suite.load_scene", lambda _: small_scene())
+    monkeypatch.setattr("transom.suite.scene_root", lambda: scenes)
+    monkeypatch.setattr("transom.workflow.scene_root", lambda: scenes)
+    for module in ("workflow", "report.pictures"):
+        monkeypatch.setattr(f"transom.{module}.load_renderer", renderers.__getitem__)
+    for module in ("run", "workflow", "report.pictures"):
+        monkeypatch.setattr(f"transom.{module}.first_surfaces", surfaces)
+    timings = [
+        Timing("small", "solve", "s", 1.0, 0.9, 1.1, 3, 2, 40),
+        Timing("small", "relight", "s", 2e-3, 1e-3, 3e-3, 9, 2, 40),
+    ]
+    monkeypatch.setattr("transom.report.build.time_scenes", lambda *_: timings)
+    return tmp_path
+
+
+def render_references() -> None:
+    renderer = NoisyRenderer(relative_noise=0.02)
+    for name in ("rooms", "hours"):
+        for question in reference_questions(load_suite(name), renderer, {}):
+            render_case(renderer, question, repository_store())
+
+
+class PageReader(HTMLParser):
+    """Collects what a browser would load, and checks that tags close."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sources: list[str] = []
+        self.images_without_alt = 0
+        self.anchors: set[str] = set()
+        self.links: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = dict(attrs)
+        if tag in ("script", "link", "iframe", "object"):
+            self.sources.append(tag)
+        if tag == "img":
+            self.sources.append(str(values["src"]))
+            self.images_without_alt += not values.get("alt")
+        if "id" in values:
+            self.anchors.add(str(values["id"]))
+        if tag == "a":
+            self.links.append(str(values["href"]))
+
+
+def test_report_is_one_offline_page_with_every_picture_in_it(project: Path) -> None:
+    render_references()
+    assert write_report(project / "report", project / "build") == 0
+    page = (project / "report" / "index.html").read_text()
+    reader = PageReader()
+    reader.feed(page)
+    assert len(reader.sources) >= 8 + 2 + 6
+    assert all(source.startswith("data:image/png;base64,") for source in reader.sources)
+    assert reader.images_without_alt == 0
+    assert all(link.removeprefix("#") in reader.anchors for link in reader.links)
+    assert not re.search(r"(src|href)\s*=\s*[\"']?https?:|url\(\s*[\"']?https?:|@import", page)
+    assert "PASS" in page and "1.0" in page
+
+
+def test_results_are_in_their_schema_and_carry_the_required_fields(project: Path) -> None:
+    render_references()
+    write_report(project / "report", project / "build")
+    text = (project / "report" / "results.json").read_text()
+    results = Results.model_validate_json(text)
+    assert results.timings[0].quantity == "solve"
+    plain = json.loads(text)
+    required = {
+        "scene",
+        "view",
+        "region",
+        "condition",
+        "method",
+        "mean_relative_error_percent",
+        "bias_percent",
+        "reference_standard_error_percent",
+        "engine_mean_cd_m2",
+        "reference_mean_cd_m2",
+    }
+    assert all(required <= row.keys() for row in plain["images"])
+    assert {row["region"] for row in plain["images"]} == {"interior", "floor", "exterior"}
+    assert {row["method"] for row in plain["images"]} == {"volumes", "rays"}
+    interior = [row for row in plain["images"] if row["region"] == "interior"]
+    assert all(row["bias_verdict"] == "PASS" for row in interior)
+    assert all(row["bias_percent"] == pytest.approx(1.0, abs=1.0) for row in interior)
+    assert [row["verdict"] for row in plain["sensors"]] == ["PASS", "PASS"]
+
+
+def test_schema_in_the_repository_is_the_one_that_results_follow() -> None:
+    assert SCHEMA_FILE.read_text() == results_schema(), "write it anew: transom.report.results.write_schema()"
+
+
+def test_missing_references_are_verdicts_and_exit_code_4(project: Path) -> None:
+    assert write_report(project / "report", project / "build") == 4
+    plain = json.loads((project / "report" / "results.json").read_text())
+    assert {verdict["outcome"] for verdict in plain["verdicts"]} >= {"NO_REFERENCE"}
+    assert "transom run references" in (project / "report" / "index.html").read_text()
+
+
+def test_crash_is_a_verdict_and_the_other_cases_still_count(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    render_references()
+    monkeypatch.setattr(FakeEngine, "crashes", True)
+    assert write_report(project / "report", project / "build") == 4
+    plain = json.loads((project / "report" / "results.json").read_text())
+    crashed = [verdict for verdict in plain["verdicts"] if verdict["outcome"] == "CRASHED"]
+    assert "asked to crash" in crashed[0]["reason"]
+    assert plain["sensors"], "sensors did not crash"
+
+
+def test_wrong_engine_fails(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    render_references()
+    monkeypatch.setattr(FakeEngine, "error", 0.12)
+    assert write_report(project / "report", project / "build") == 1
+
+
+def test_changed_tolerance_judges_again_without_rendering(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from transom.judge import exit_code
+    from transom.workflow import judge_compared
+
+    render_references()
+    write_report(project / "report", project / "build")
+    monkeypatch.setattr(FakeEngine, "crashes", True)
+    path = project / "scenes" / "tolerances.toml"
+    path.write_text(path.read_text().replace("tolerance = 3.0", "tolerance = 0.001"))
+    assert exit_code(judge_compared("rooms", project / "build")) in (1, 3)
+
+
+def test_report_without_rendering_uses_the_timings_that_are_there(project: Path) -> None:
+    render_references()
+    write_report(project / "report", project / "build")
+    timings = [Timing("small", "solve", "s", 7.0, 7.0, 7.0, 1, 2, 40)]
+    write_timings(project / "build" / "runs" / "timings.json", timings)
+    write_report(project / "report", project / "build", render=False)
+    assert json.loads((project / "report" / "results.json").read_text())["timings"][0]["median"] == 7.0
+
+
+@pytest.mark.parametrize(
+    ("value", "uncertainty", "text"), [(916.4049, 0.03, "916.40"), (916.4049, 0.3, "916.4"), (916.4, 4, "916")]
+)
+def test_values_are_rounded_to_their_uncertainty(value: float, uncertainty: float, text: str) -> None:
+    assert rounded(value, uncertainty) == text
+
+
+def test_numbers_as_text() -> None:
+    assert fixed(None) == fixed(float("nan")) == "–"
+    assert fixed(-0.04, 1) == "0.0"
+    assert signed(-1.26, 1) == "\N{MINUS SIGN}1.3"
+    assert signed(1.26, 1) == "+1.3"
+    assert seconds(0.01234).startswith("12.3")
+    assert seconds(0.01234).endswith("ms")
+    assert seconds(61.7).startswith("61.7")
+
+
+def test_tone_mapping_has_a_fixed_scale() -> None:
+    grey_levels = tone_mapped(np.array([[[0.0] * 3, [500.0] * 3, [1000.0] * 3, [9000.0] * 3]]), 1000.0)
+    assert grey_levels[0, :, 0].tolist() == [0, 188, 255, 255], "half of white is 188 in sRGB"
+
+
+def test_equal_values_have_equal_colours_in_different_pictures() -> None:
+    first = false_colour_png(np.array([[10.0, 100.0, 1000.0]]), LUMINANCE_SCALE)
+    second = false_colour_png(np.array([[10.0, 100.0, 1000.0]]), LUMINANCE_SCALE)
+    assert first == second
+    position = DIFFERENCE_SCALE.position(np.array([-50.0, 0.0, 50.0, np.nan]))
+    np.testing.assert_array_equal(position, [0.0, 0.5, 1.0, np.nan])
+
+
+def test_scales_and_timings_are_svg_with_units() -> None:
+    assert "luminance [cd/m²]" in scale_svg(LUMINANCE_SCALE)
+    text = timings_svg([TimingBar("room: relight", 1e-3, 2e-3, (1.0, 3.0))])
+    assert text.startswith("<svg") and "time [s]" in text
