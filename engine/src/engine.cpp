@@ -276,26 +276,13 @@ void Engine::gather_nodes() {
     rows[i].reached.insert(rows[i].reached.end(), rows[i].through.begin(), rows[i].through.end());
   });
 
-  const int per_slot = mesh_->elements_per_slot();
-  element_begin_.assign(slot_of_patch_.size() * static_cast<std::size_t>(per_slot) + 1, 0);
-  const auto element_of = [&](int global) {
-    const int patch = patch_of_slot_[global / per_slot];
-    return patch < 0 ? -1 : patch * per_slot + global % per_slot;
-  };
   node_is_exposed_.resize(nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     node_is_exposed_[i] = rows[i].exposure >= kExposedNode;
     node_sky_.append(rows[i].sky);
     node_patches_.append(to_patches(rows[i].reached));
-    for (const Share& share : rows[i].reached)
-      if (const int e = element_of(share.index); e >= 0) ++element_begin_[static_cast<std::size_t>(e) + 1];
   }
-  std::partial_sum(element_begin_.begin(), element_begin_.end(), element_begin_.begin());
-  std::vector<std::size_t> next(element_begin_.begin(), element_begin_.end() - 1);
-  element_views_.resize(element_begin_.back());
-  for (std::size_t i = 0; i < nodes.size(); ++i)
-    for (const Share& share : rows[i].reached)
-      if (const int e = element_of(share.index); e >= 0) element_views_[next[e]++] = {static_cast<int>(i), share.weight};
+  nodes_ = std::move(nodes);
 }
 
 // A cell is split when something stands between its nodes: there interpolation must ask which nodes a point sees.
@@ -344,6 +331,7 @@ void Engine::relight(Condition condition) {
   {
     const TracePhase phase(trace_, "beams");
     lit = direct_light_->deposit(lighting_.condition.beams, slot_of_patch_, hash_seed(options_.seed, kBeamStream));
+    first_bounce_ = std::make_unique<FirstBounce>(*mesh_, *rays_, lit, [&](int slot) { return patch_reflectance_[patch_of_slot_[slot]]; });
   }
   std::vector<glm::vec3> sky(n), from_beams(n, glm::vec3(0)), direct(n);
   {
@@ -353,12 +341,11 @@ void Engine::relight(Condition condition) {
   {
     const TracePhase phase(trace_, "interreflection");
     lighting_.element_direct.assign(n * static_cast<std::size_t>(per_slot), glm::vec3(0));
-    for (LitElement& e : lit) {
+    for (const LitElement& e : lit) {
       const int patch = patch_of_slot_[e.element / per_slot];
       const Slot slot = mesh_->slot(e.element / per_slot);
       from_beams[patch] += e.illuminance * (mesh_->element_area(slot.face, slot.cell, e.element % per_slot) / patch_area_[patch]);
-      e.element = patch * per_slot + e.element % per_slot;
-      lighting_.element_direct[e.element] = e.illuminance;
+      lighting_.element_direct[patch * per_slot + e.element % per_slot] = e.illuminance;
     }
     for (std::size_t p = 0; p < n; ++p) direct[p] = sky[p] + from_beams[p];
     lighting_.patch_irradiance = direct;
@@ -377,12 +364,8 @@ void Engine::relight(Condition condition) {
     parallel_indices(node_count, 64, [&](std::size_t i) {
       lighting_.node_sky[i] = sky_light(node_sky_, i);
       lighting_.node_indirect[i] = node_patches_.dot(i, lighting_.patch_smooth_radiosity);
+      if (node_is_exposed_[i]) lighting_.node_indirect[i] += first_bounce_->irradiance(nodes_[i].position, nodes_[i].normal);
     });
-    for (const LitElement& e : lit) {
-      const glm::vec3 radiosity = patch_reflectance_[e.element / per_slot] * e.illuminance;
-      for (std::size_t k = element_begin_[e.element]; k < element_begin_[e.element + 1]; ++k)
-        lighting_.node_indirect[element_views_[k].index] += element_views_[k].weight * radiosity;
-    }
   }
 }
 
@@ -405,8 +388,10 @@ std::vector<Irradiance> Engine::illuminance(const std::vector<glm::dvec3>& point
     sky.append(row.sky);
     result[i].direct = direct_light_->illuminance(lighting_.condition.beams, node.position, normal);
     result[i].sky = sky_light(sky, 0);
+    result[i].indirect = first_bounce_->irradiance(node.position, normal);
     for (const std::vector<Share>* shares : {&row.reached, &row.through})
-      for (const Share& share : *shares) result[i].indirect += share.weight * element_radiosity(share.index);
+      for (const Share& share : to_patches(*shares))
+        result[i].indirect += share.weight * lighting_.patch_smooth_radiosity[share.index];
   });
   return result;
 }
@@ -434,7 +419,8 @@ Irradiance Engine::interpolate(int face, Side side, glm::vec2 st, glm::vec3 lift
       SparseRows const& sky = patch_sky_;
       const glm::vec3 from_sky = sky_light(sky, static_cast<std::size_t>(patch));
       const glm::vec3 smooth = form_factors_.dot(static_cast<std::size_t>(patch), lighting_.patch_smooth_radiosity);
-      return {glm::vec3(0), from_sky, smooth};
+      const glm::vec3 normal = side == 0 ? faces_.faces[face].normal : -faces_.faces[face].normal;
+      return {glm::vec3(0), from_sky, smooth + first_bounce_->irradiance(lifted_point, normal)};
     }
     for (int k = 0; k < nodes.count; ++k) nodes.weight[k] /= sum;
   }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "transom/deposit.h"
+#include "transom/first_bounce.h"
 #include "transom/gather.h"
 #include "transom/geometry.h"
 #include "transom/light_mesh.h"
@@ -126,6 +127,7 @@ class Engine {
   std::unique_ptr<SkyBinIndex> sky_index_;
   std::unique_ptr<Gatherer> gatherer_;
   std::unique_ptr<DirectLight> direct_light_;
+  std::unique_ptr<FirstBounce> first_bounce_;  // of the present condition
 
   // Patches: the slots that take part.
   std::vector<int> patch_of_slot_;  // -1: takes no part
@@ -137,10 +139,9 @@ class Engine {
 
   // Nodes of every face side that takes part.
   std::vector<int> first_node_;     // by 2 * face + side; -1: none
+  std::vector<Node> nodes_;
   std::vector<char> node_is_exposed_;
   SparseRows node_sky_, node_patches_;
-  std::vector<std::size_t> element_begin_;  // nodes that see an element: element_views_[begin[e] .. begin[e + 1])
-  std::vector<Share> element_views_;
   std::vector<char> is_split_;      // by slot: something stands between the nodes of the cell
 
   Lighting lighting_;

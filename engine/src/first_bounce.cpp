@@ -1,0 +1,99 @@
+#include "transom/first_bounce.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "transom/closed_form.h"
+
+namespace transom {
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+constexpr float kFar = 4;       // diameters from which a patch counts as a point: then it errs by about 1 % of its share
+constexpr float kAdjacent = 3;  // diameters below which an element needs its closed form
+
+struct Connection {
+  Ray ray;
+  glm::vec3 irradiance;
+};
+
+}  // namespace
+
+void FirstBounce::add(const LitElement& lit, glm::vec3 reflectance) {
+  const int slot_index = lit.element / mesh_.elements_per_slot(), element = lit.element % mesh_.elements_per_slot();
+  const Slot slot = mesh_.slot(slot_index);
+  const Face& face = mesh_.faces().faces[slot.face];
+  const glm::vec3 normal = slot.side == 0 ? face.normal : -face.normal;
+  if (patches_.empty() || patches_.back().slot != slot_index)
+    patches_.push_back({slot_index, pieces_.size(), pieces_.size(), glm::vec3(0), normal, glm::vec3(0), 0,
+                        std::sqrt(2 * mesh_.cell_area(slot.face, slot.cell))});
+  LitPatch& patch = patches_.back();
+
+  LitPiece piece;
+  const bool is_quad = mesh_.grid(slot.face).is_quad;
+  piece.corner_count = is_quad ? 4 : 3;
+  const glm::vec2 quad_corner[4]{{0, 0}, {1, 0}, {1, 1}, {0, 1}}, triangle_corner[3]{{0, 0}, {1, 0}, {0, 1}};
+  for (int k = 0; k < piece.corner_count; ++k) {
+    const glm::vec2 local = is_quad ? quad_corner[k] : triangle_corner[k];
+    // Counter-clockwise from the lit side.
+    const int place = slot.side == 0 ? k : piece.corner_count - 1 - k;
+    piece.corner[place] = face.position(mesh_.element_parameters(slot.face, slot.cell, element, local));
+  }
+  // In a triangle's grid every second cell is turned; its corners keep their sense, since it is turned by half a circle.
+  piece.middle = mesh_.lifted_position(
+      slot.face, slot.side, mesh_.element_parameters(slot.face, slot.cell, element, is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3)));
+  piece.area = mesh_.element_area(slot.face, slot.cell, element);
+  piece.radiosity = reflectance * lit.illuminance;
+  pieces_.push_back(piece);
+
+  const float weight = piece.area * (lit.illuminance.x + lit.illuminance.y + lit.illuminance.z);
+  patch.last_element = pieces_.size();
+  patch.centroid = (patch.centroid * patch.weight + piece.middle * weight) / (patch.weight + weight);
+  patch.weight += weight;
+  patch.flux += piece.area * piece.radiosity;
+}
+
+glm::vec3 FirstBounce::irradiance(glm::vec3 point, glm::vec3 normal) const {
+  thread_local std::vector<Connection> connections;
+  thread_local std::vector<Ray> rays;
+  thread_local std::vector<std::uint8_t> blocked;
+  connections.clear();
+  const auto connect = [&](glm::vec3 place, glm::vec3 irradiance) {
+    connections.push_back({{point, place - point, 0, 1}, irradiance});
+  };
+  for (const LitPatch& patch : patches_) {
+    const glm::vec3 to_patch = patch.centroid - point;
+    const float height = -glm::dot(to_patch, patch.normal);
+    if (height <= 0) continue;  // all of a planar patch is seen from behind
+    const float distance2 = glm::dot(to_patch, to_patch);
+    if (distance2 > kFar * kFar * patch.size * patch.size) {
+      const float cosine = glm::dot(to_patch, normal);
+      if (cosine > 0) connect(patch.centroid, patch.flux * (cosine * height / (kPi * distance2 * distance2)));
+      continue;
+    }
+    for (std::size_t k = patch.first_element; k < patch.last_element; ++k) {
+      const LitPiece& piece = pieces_[k];
+      const glm::vec3 to_piece = piece.middle - point;
+      const float d2 = glm::dot(to_piece, to_piece);
+      if (d2 > kAdjacent * kAdjacent * 2 * piece.area) {
+        const float cosine = glm::dot(to_piece, normal), piece_height = -glm::dot(to_piece, patch.normal);
+        if (cosine > 0 && piece_height > 0)
+          connect(piece.middle, piece.radiosity * (piece.area * cosine * piece_height / (kPi * d2 * d2)));
+      } else {
+        const float share = point_to_polygon(point, normal, {piece.corner, static_cast<std::size_t>(piece.corner_count)});
+        if (share > 0) connect(piece.middle, piece.radiosity * share);
+      }
+    }
+  }
+  if (connections.empty()) return glm::vec3(0);
+  rays.clear();
+  for (const Connection& c : connections) rays.push_back(c.ray);
+  blocked.resize(rays.size());
+  rays_.occluded(RayScene::What::kOpaque, rays, blocked);
+  glm::vec3 sum(0);
+  for (std::size_t k = 0; k < connections.size(); ++k)
+    if (!blocked[k]) sum += connections[k].irradiance * rays_.transmittance(connections[k].ray);
+  return sum;
+}
+
+}  // namespace transom
