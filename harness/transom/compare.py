@@ -44,7 +44,8 @@ class ImageComparison:
     the reference's own relative standard error. mean_relative_error_percent: extrapolated to no noise; its standard
     error bounds what the noise can do to it. relative_rmse_percent: from independent halves, unbiased by noise, as a
     share of the reference's mean; None where it is below the noise. block_*: quantiles of |relative error| over
-    blocks of 4x4 pixels. share_within_*: of pixels.
+    blocks of 4x4 pixels. share_within_*: of pixels. *_numerical_percent: the engine's own numerical bias of that
+    quantity, from a solve with half as many patches; None where it was not estimated.
     """
 
     scene: str
@@ -72,13 +73,18 @@ class ImageComparison:
     share_within_5_percent: float
     share_within_10_percent: float
     reference_batch_count: int
+    mean_relative_error_numerical_percent: float | None = None
+    bias_numerical_percent: float | None = None
     engine_key: str = ""
     reference_key: str = ""
 
 
 @dataclass(frozen=True)
 class SensorComparison:
-    """One sensor: place [m], illuminances [lx], and the signed relative error [%]."""
+    """One sensor: place [m], illuminances [lx], and the signed relative error [%].
+
+    error_numerical_percent: as for images, the engine's own numerical bias, None where it was not estimated.
+    """
 
     scene: str
     set: str
@@ -95,6 +101,7 @@ class SensorComparison:
     error_percent: float
     error_standard_error_percent: float
     reference_batch_count: int
+    error_numerical_percent: float | None = None
     engine_key: str = ""
     reference_key: str = ""
 
@@ -140,9 +147,17 @@ def block_errors(engine: Float64, reference: Float64, mask: Bool, floor: float) 
 
 
 def compare_region(
-    engine: ImageResult, reference: ImageResult, mask: Bool, region: str, names: CaseNames
+    engine: ImageResult,
+    reference: ImageResult,
+    mask: Bool,
+    region: str,
+    names: CaseNames,
+    coarse: ImageResult | None = None,
 ) -> ImageComparison:
-    """Compares the pixels in `mask` (h, w). Raises ValueError for an empty mask or pictures of different size."""
+    """Compares the pixels in `mask` (h, w). coarse: the engine's picture from half as many patches, if there is one.
+
+    Raises ValueError for an empty mask or pictures of different size.
+    """
     if engine.mean.shape != reference.mean.shape:
         raise ValueError(f"pictures of {engine.mean.shape} and {reference.mean.shape} cannot be compared")
     if not mask.any():
@@ -165,6 +180,12 @@ def compare_region(
     mse = cross_half_mse(ours, *halves)
     blocks = block_errors(ours_image, theirs_image, mask, floor)
     quantiles = np.percentile(blocks if blocks.size else error, [50, 95, 99])
+    error_numerical, bias_numerical = None, None
+    if coarse is not None:
+        rough = luminance(coarse.mean).astype(np.float64)[mask]
+        rough_error = np.abs(signed_relative_error(rough, theirs, floor))
+        error_numerical = 100 * abs(float(error.mean() - rough_error.mean()))
+        bias_numerical = 100 * abs(float(ours.mean() - rough.mean())) / mean if mean > 0 else 0.0
     within = [100 * float(np.mean(error <= limit / 100)) for limit in SHARE_LIMITS_PERCENT]
     return ImageComparison(
         scene=names.scene,
@@ -192,21 +213,31 @@ def compare_region(
         share_within_5_percent=within[1],
         share_within_10_percent=within[2],
         reference_batch_count=names.reference_batch_count,
+        mean_relative_error_numerical_percent=error_numerical,
+        bias_numerical_percent=bias_numerical,
         engine_key=names.engine_key,
         reference_key=names.reference_key,
     )
 
 
 def compare_images(
-    engine: ImageResult, reference: ImageResult, interior: Bool, regions: Mapping[str, Bool], names: CaseNames
+    engine: ImageResult,
+    reference: ImageResult,
+    interior: Bool,
+    regions: Mapping[str, Bool],
+    names: CaseNames,
+    coarse: ImageResult | None = None,
 ) -> list[ImageComparison]:
     """The interior, each named region that the view sees, and the exterior apart."""
     masks = {INTERIOR: interior, **regions, EXTERIOR: ~interior}
-    return [compare_region(engine, reference, mask, name, names) for name, mask in masks.items() if mask.any()]
+    return [compare_region(engine, reference, mask, name, names, coarse) for name, mask in masks.items() if mask.any()]
 
 
-def compare_sensors(engine: SensorTable, reference: SensorTable, names: CaseNames) -> list[SensorComparison]:
-    """Sensor by sensor. Raises ValueError when the tables are not of the same, measured, sensors."""
+def compare_sensors(
+    engine: SensorTable, reference: SensorTable, names: CaseNames, coarse: SensorTable | None = None
+) -> list[SensorComparison]:
+    """Sensor by sensor. coarse: the engine's values from half as many patches, if there are any.
+    Raises ValueError when the tables are not of the same, measured, sensors."""
     if engine.illuminance is None or reference.illuminance is None or reference.standard_error is None:
         raise ValueError("sensors without values cannot be compared")
     if engine.points.shape != reference.points.shape or not np.allclose(engine.points, reference.points, atol=1e-6):
@@ -216,6 +247,7 @@ def compare_sensors(engine: SensorTable, reference: SensorTable, names: CaseName
         ours, theirs = float(engine.illuminance[index]), float(reference.illuminance[index])
         error = float(reference.standard_error[index])
         scale = theirs if theirs > 0 else 1.0
+        rough = None if coarse is None or coarse.illuminance is None else float(coarse.illuminance[index])
         rows.append(
             SensorComparison(
                 scene=names.scene,
@@ -233,6 +265,7 @@ def compare_sensors(engine: SensorTable, reference: SensorTable, names: CaseName
                 error_percent=100 * (ours - theirs) / scale,
                 error_standard_error_percent=100 * error / scale,
                 reference_batch_count=names.reference_batch_count,
+                error_numerical_percent=None if rough is None else 100 * abs(ours - rough) / scale,
                 engine_key=names.engine_key,
                 reference_key=names.reference_key,
             )

@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 from scipy import ndimage
 
 from transom.colour import luminance
-from transom.compare import ImageComparison, SensorComparison
+from transom.compare import EXTERIOR, ImageComparison, SensorComparison
 from transom.errors import InputError
 from transom.files import write_atomic
 from transom.judge import Missing, Subject
@@ -19,9 +19,6 @@ from transom.renderer import ImageResult
 from transom.suite import invalid_field
 
 COMPARISON_FORMAT = 1
-
-EXTERIOR_IS_JUDGED = False
-"""Directly seen sky and ground are reported apart; only a tolerance that names them could judge them."""
 
 DISAGREEMENT_SHARE = 0.01
 """Two visibility methods disagree on a pixel where their luminances differ by more than this share."""
@@ -73,21 +70,30 @@ class Comparison:
     missing: tuple[Missing, ...] = ()
 
     def subjects(self) -> list[Subject]:
-        """What there is to judge. Signed differences; a mean relative error counts as a difference from zero."""
+        """What there is to judge. Signed differences; a mean relative error counts as a difference from zero.
+
+        Directly seen sky and ground are reported and not judged: they say nothing of light transport.
+        """
         found: list[Subject] = []
         for row in self.images:
-            if row.region == "exterior" and not EXTERIOR_IS_JUDGED:
+            if row.region == EXTERIOR:
                 continue
             place = (row.scene, row.view, row.region, row.condition, row.method, row.reference)
             batches = row.reference_batch_count
             error, noise = row.mean_relative_error_percent, row.mean_relative_error_standard_error_percent
-            found.append(Subject("mean_relative_error_percent", *place, error, noise, batch_count=batches))
-            bias, noise = row.bias_percent, row.bias_standard_error_percent
-            found.append(Subject("bias_percent", *place, bias, noise, batch_count=batches))
+            numerical = row.mean_relative_error_numerical_percent or 0.0
+            found.append(Subject("mean_relative_error_percent", *place, error, noise, numerical, batches))
+            bias, noise, numerical = (
+                row.bias_percent,
+                row.bias_standard_error_percent,
+                row.bias_numerical_percent or 0.0,
+            )
+            found.append(Subject("bias_percent", *place, bias, noise, numerical, batches))
         for sensor in self.sensors:
             place = (sensor.scene, "", sensor.set, sensor.condition, sensor.method, sensor.reference)
             error, noise = sensor.error_percent, sensor.error_standard_error_percent
-            found.append(Subject("sensor_percent", *place, error, noise, batch_count=sensor.reference_batch_count))
+            numerical, batches = sensor.error_numerical_percent or 0.0, sensor.reference_batch_count
+            found.append(Subject("sensor_percent", *place, error, noise, numerical, batches))
         for pair in self.agreements:
             place = (pair.scene, pair.view, "", pair.condition, "volumes", "rays")
             found.append(Subject("agreement_percent", *place, pair.away_from_edges_percent))

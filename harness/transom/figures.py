@@ -135,7 +135,7 @@ def timings_svg(bars: Sequence[TimingBar]) -> str:
 
     settings: dict[Any, object] = {"svg.fonttype": "none", "svg.hashsalt": "transom", "font.size": 9}
     with mpl.rc_context(settings):
-        figure = Figure(figsize=(7.2, 0.34 * len(bars) + 0.75), layout="constrained")
+        figure = Figure(figsize=(9.6, 0.26 * len(bars) + 0.75), layout="constrained")
         axes = figure.subplots()
         for row, bar in enumerate(reversed(bars)):
             if bar.paper_s is not None:

@@ -27,6 +27,8 @@ SENSOR_TARGET_PERCENT = 0.2
 LEAST_BATCHES = 32
 """Published references have at least so many batches, so that Student's quantile stays near the normal one."""
 
+COARSE_VISIBILITY = "volumes"
+
 GREATEST_GROWTH = 4.0
 """A noise estimate from few batches is not trusted to order more than this many times what was rendered."""
 
@@ -96,7 +98,10 @@ def reference_questions(suite: Suite, renderer: Renderer, options: Mapping[str, 
 
 
 def engine_questions(suite: Suite, renderer: Renderer, visibilities: tuple[str, ...]) -> Iterator[Question]:
-    """The engine's cases of a suite: every view by every visibility method, and every scene's sensors."""
+    """The engine's cases of a suite: every view by every visibility method, and every scene's sensors.
+
+    Then, for suites that are shown view by view, the same with fewer patches (`coarse_options`).
+    """
     for entry in suite.cases:
         table = scene_sensors(entry.scene) if entry.sensors else None
         if table is not None:
@@ -105,13 +110,23 @@ def engine_questions(suite: Suite, renderer: Renderer, visibilities: tuple[str, 
             for visibility in visibilities:
                 options = {"visibility": visibility}
                 yield Question(make_case(entry.scene, entry.condition, renderer, options, view=view))
+    coarse = coarse_options(renderer)
+    for entry in suite.cases if coarse is not None and suite.layout == "views" else ():
+        table = scene_sensors(entry.scene) if entry.sensors else None
+        if table is not None:
+            yield Question(make_case(entry.scene, entry.condition, renderer, coarse or {}, sensors=table))
+        for view in entry.views:
+            yield Question(make_case(entry.scene, entry.condition, renderer, coarse or {}, view=view))
 
 
-def achieved_percent(bundle: Bundle, scene: Scene, view: View | None) -> float:
-    """Relative standard error of a reference [%]: mean over interior pixels, or median over sensors."""
-    if view is not None:
-        return _image_percent(bundle.image(), scene, view)
-    return _sensor_percent(bundle.sensors())
+def coarse_options(renderer: Renderer) -> dict[str, Any] | None:
+    """Options of the engine with half as many patches, whose answer shows how far the usual one has converged.
+
+    The error of patch radiosity falls at least as fast as 1 / patches where light is smooth, so that the difference
+    between N/2 and N patches is an estimate of the error with N. None for a renderer without patches.
+    """
+    count = renderer.default_options().get("target_patch_count")
+    return None if count is None else {"visibility": COARSE_VISIBILITY, "target_patch_count": int(count) // 2}
 
 
 def _is_good_enough(bundle: Bundle, question: Question) -> bool:

@@ -27,10 +27,10 @@ from transom.judge import Missing, Outcome, Verdict, exit_code, judge, read_tole
 from transom.known_answers import compare_known_answers
 from transom.progress import CaseProgress
 from transom.renderer import Renderer, load_renderer
-from transom.run import Question, engine_questions, render_case
+from transom.run import Question, coarse_options, engine_questions, render_case
 from transom.scene import scene_root
 from transom.scene.model import View
-from transom.sensor_file import scene_sensors
+from transom.sensor_file import SensorTable, scene_sensors
 from transom.suite import Suite, SuiteCase, load_suite
 from transom.visible import first_surfaces, region_pixels
 
@@ -83,7 +83,7 @@ def render_suite(suite: Suite, *, fresh: bool = False) -> list[Crash]:
     crashes: list[Crash] = []
     with CaseProgress(len(questions), Console(stderr=True)) as bars:
         for question in questions:
-            bars.begin(question.case.label + "-" + str(question.case.options.get("visibility", "")))
+            bars.begin(_question_words(question))
             try:
                 bundle = render_case(renderer, question, progress=bars.update, fresh=fresh)
             except InputError:
@@ -94,6 +94,12 @@ def render_suite(suite: Suite, *, fresh: bool = False) -> list[Crash]:
             else:
                 bars.finish(f"{bundle.record.wall_seconds:.1f} s")
     return crashes
+
+
+def _question_words(question: Question) -> str:
+    options = question.case.options
+    patches = options.get("target_patch_count", "")
+    return " ".join(str(part) for part in (question.case.label, options.get("visibility", ""), patches) if part)
 
 
 def compare_finished(name: str, build: Path) -> Comparison:
@@ -188,9 +194,11 @@ def _compare_view(
         surfaces = first_surfaces(scene, view)
         regions = {region.name: region_pixels(scene, region, surfaces) for region in scene.regions}
         reference = truth.image()
+        coarse = _coarse(entry, engine, view=view)
+        rough = None if coarse is None else coarse.image()
         for visibility, bundle in rendered.items():
             names = _names(entry, view.name, visibility, bundle, truth)
-            found.images += compare_images(bundle.image(), reference, surfaces.interior, regions, names)
+            found.images += compare_images(bundle.image(), reference, surfaces.interior, regions, names, rough)
     if len(rendered) == len(VISIBILITIES):
         pair = [rendered[visibility].image() for visibility in VISIBILITIES]
         found.agreements.append(compare_methods(scene.name, view.name, condition.name, pair[0], pair[1]))
@@ -210,7 +218,19 @@ def _compare_sensors(
         found.missing.append(Missing(Outcome.CRASHED, scene.name, "sensors", condition.name, ENGINE, message))
     elif truth is not None:
         names = _names(entry, "", "rays", ours, truth)
-        found.sensors += compare_sensors(ours.sensors(), truth.sensors(), names)
+        coarse = _coarse(entry, engine, sensors=table)
+        rough = None if coarse is None else coarse.sensors()
+        found.sensors += compare_sensors(ours.sensors(), truth.sensors(), names, rough)
+
+
+def _coarse(
+    entry: SuiteCase, engine: Renderer, view: View | None = None, sensors: SensorTable | None = None
+) -> Bundle | None:
+    """The engine's answer from half as many patches, where it was rendered."""
+    options = coarse_options(engine)
+    if options is None:
+        return None
+    return find_bundle(make_case(entry.scene, entry.condition, engine, options, view=view, sensors=sensors))
 
 
 def _names(entry: SuiteCase, view: str, method: str, ours: Bundle, truth: Bundle) -> CaseNames:

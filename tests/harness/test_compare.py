@@ -176,3 +176,12 @@ def test_sensor_error_is_relative_to_the_reference() -> None:
     moved = SensorTable(("desk", "desk"), points + 0.1, normals).measured(np.ones(2), np.zeros(2))
     with pytest.raises(ValueError, match="different sensors"):
         compare_sensors(moved, reference, NAMES)
+
+
+def test_numerical_bias_is_the_change_from_half_as_many_patches() -> None:
+    truth = smooth_truth()
+    ours, coarse = ImageResult(grey(1.01 * truth)), ImageResult(grey(1.03 * truth))
+    result = compare_region(ours, ImageResult(grey(truth)), EVERYWHERE, "all", NAMES, coarse)
+    assert result.bias_numerical_percent == pytest.approx(2.0, rel=1e-3)
+    assert result.mean_relative_error_numerical_percent == pytest.approx(2.0, rel=0.02)
+    assert compare_region(ours, ours, EVERYWHERE, "all", NAMES).bias_numerical_percent is None

@@ -92,6 +92,7 @@ def region_rows(images: Iterable[Any]) -> list[TableRow]:
                 Cell(_several(row, "block_{}_percent", ("p50", "p95", "p99"), 1)),
                 Cell(_several(row, "share_within_{}_percent", ("2", "5", "10"), 0)),
                 Cell(fixed(row.reference_standard_error_percent, 2)),
+                Cell(fixed(row.bias_numerical_percent, 2)),
                 _worst([row.mean_relative_error_verdict, row.bias_verdict]),
             )
         )
@@ -208,6 +209,7 @@ def verdict_rows(verdicts: Sequence[Verdict]) -> list[TableRow]:
             Cell(", ".join(part for part in place if part)),
             Cell(signed(verdict.difference, 2) if verdict.difference is not None else ""),
             Cell(fixed(verdict.expanded_uncertainty, 2) if verdict.expanded_uncertainty is not None else ""),
+            Cell(fixed(verdict.numerical_bias, 2) if verdict.numerical_bias is not None else ""),
             Cell(fixed(verdict.tolerance, 1) if verdict.tolerance is not None else ""),
             Cell(needed),
         )
