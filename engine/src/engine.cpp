@@ -50,6 +50,7 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
     open_hollow_components();
   }
   std::vector<GatherRow> rows;
+  std::vector<int> divisions;
   {
     const TracePhase phase(trace_, "patches");
     find_patches(first_slots(), rows);
@@ -58,13 +59,13 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
   }
   {
     const TracePhase phase(trace_, "transfer");
+    divisions = cell_divisions(rows);
     assemble_transfer(rows);
     rows.clear();
   }
   {
     const TracePhase phase(trace_, "nodes");
-    gather_nodes();
-    find_split_cells();
+    gather_nodes(divisions);
   }
   facts_.face_count = static_cast<int>(faces_.faces.size());
   facts_.patch_count = static_cast<int>(slot_of_patch_.size());
@@ -259,53 +260,42 @@ void Engine::assemble_transfer(std::vector<GatherRow>& rows) {
   facts_.defects = make_reciprocal(form_factors_, patch_area_, row_sums);
 }
 
-void Engine::gather_nodes() {
-  first_node_.assign(2 * faces_.faces.size(), -1);
-  std::vector<Node> nodes;
-  for (const int slot_index : slot_of_patch_) {
-    const Slot slot = mesh_->slot(slot_index);
-    int& first = first_node_[2 * slot.face + slot.side];
-    if (first >= 0 || reflectance(slot.face, slot.side) == glm::vec3(0)) continue;
-    first = static_cast<int>(nodes.size());
-    for (int k = 0; k < mesh_->grid(slot.face).node_count(); ++k) nodes.push_back(mesh_->node(slot.face, slot.side, k));
+// Cells are divided where the harmonic mean distance of what they see is short against their size: there irradiance changes
+// within the cell [after Ward & Heckbert 1992].
+std::vector<int> Engine::cell_divisions(const std::vector<GatherRow>& rows) const {
+  std::vector<int> divisions;
+  for (std::size_t p = 0; p < rows.size(); ++p) {
+    const Slot slot = mesh_->slot(slot_of_patch_[p]);
+    const float size = std::sqrt(mesh_->cell_area(slot.face, slot.cell));
+    const float wanted = size / (options_.node_spacing * std::max(rows[p].harmonic_distance, 1e-6f * faces_.extent));
+    divisions.push_back(wanted > 2 ? 4 : wanted > 1 ? 2 : 1);
   }
+  return divisions;
+}
+
+void Engine::gather_nodes(const std::vector<int>& divisions) {
+  std::vector<int> slots, slot_divisions;
+  for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)
+    if (patch_reflectance_[p] != glm::vec3(0)) {
+      slots.push_back(slot_of_patch_[p]);
+      slot_divisions.push_back(divisions[p]);
+    }
+  nodes_ = std::make_unique<NodeField>(*mesh_, *rays_, slots, slot_divisions);
+  const std::vector<Node>& nodes = nodes_->nodes();
   facts_.node_count = static_cast<int>(nodes.size());
   std::vector<GatherRow> rows(nodes.size());
   parallel_indices(nodes.size(), kGrain, [&](std::size_t i) {
     rows[i] = gatherer_->gather_at_point(nodes[i], options_.node_samples, hash_seed(options_.seed, hash_seed(kNodeStream, i)));
     rows[i].reached.insert(rows[i].reached.end(), rows[i].through.begin(), rows[i].through.end());
+    rows[i].reached = to_patches(rows[i].reached);
   });
-
-  node_is_exposed_.resize(nodes.size());
+  std::vector<char> is_exposed(nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    node_is_exposed_[i] = rows[i].exposure >= kExposedNode;
+    is_exposed[i] = rows[i].exposure >= kExposedNode;
     node_sky_.append(rows[i].sky);
-    node_patches_.append(to_patches(rows[i].reached));
+    node_patches_.append(rows[i].reached);
   }
-  nodes_ = std::move(nodes);
-}
-
-// A cell is split when something stands between its nodes: there interpolation must ask which nodes a point sees.
-void Engine::find_split_cells() {
-  is_split_.assign(patch_of_slot_.size(), 0);
-  parallel_indices(slot_of_patch_.size(), kGrain, [&](std::size_t p) {
-    const Slot slot = mesh_->slot(slot_of_patch_[p]);
-    const int first = first_node_[2 * slot.face + slot.side];
-    if (first < 0) return;
-    const Grid& grid = mesh_->grid(slot.face);
-    const NodeWeights corners = grid.interpolate({slot.cell, {0.3f, 0.3f}});
-    std::vector<glm::vec3> places;
-    for (int k = 0; k < corners.count; ++k)
-      places.push_back(mesh_->node(slot.face, slot.side, corners.node[k]).position);
-    std::vector<Ray> rays;
-    for (std::size_t a = 0; a < places.size(); ++a)
-      for (std::size_t b = a + 1; b < places.size(); ++b) rays.push_back({places[a], places[b] - places[a], 0, 1});
-    std::vector<std::uint8_t> blocked(rays.size());
-    rays_->occluded(RayScene::What::kOpaque, rays, blocked);
-    bool split = std::find(blocked.begin(), blocked.end(), 1) != blocked.end();
-    for (int k = 0; k < corners.count; ++k) split |= !node_is_exposed_[first + corners.node[k]];
-    is_split_[slot_of_patch_[p]] = split;
-  });
+  nodes_->finish(std::move(is_exposed));
 }
 
 glm::vec3 Engine::sky_light(const SparseRows& rows, std::size_t row) const {
@@ -364,7 +354,8 @@ void Engine::relight(Condition condition) {
     parallel_indices(node_count, 64, [&](std::size_t i) {
       lighting_.node_sky[i] = sky_light(node_sky_, i);
       lighting_.node_indirect[i] = node_patches_.dot(i, lighting_.patch_smooth_radiosity);
-      if (node_is_exposed_[i]) lighting_.node_indirect[i] += first_bounce_->irradiance(nodes_[i].position, nodes_[i].normal);
+      if (nodes_->is_exposed(i))
+        lighting_.node_indirect[i] += first_bounce_->irradiance(nodes_->nodes()[i].position, nodes_->nodes()[i].normal);
     });
   }
 }
@@ -397,37 +388,20 @@ std::vector<Irradiance> Engine::illuminance(const std::vector<glm::dvec3>& point
 }
 
 Irradiance Engine::interpolate(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const {
-  const int first = first_node_[2 * face + side];
-  if (first < 0) return {};
-  const CellPoint point = mesh_->grid(face).locate(st);
-  NodeWeights nodes = mesh_->grid(face).interpolate(point);
-  if (is_split_[mesh_->slot_index(face, side, point.cell)]) {
-    Ray rays[4];
-    std::uint8_t blocked[4];
-    for (int k = 0; k < nodes.count; ++k)
-      rays[k] = {lifted_point, mesh_->node(face, side, nodes.node[k]).position - lifted_point, 0, 1};
-    rays_->occluded(RayScene::What::kOpaque, {rays, static_cast<std::size_t>(nodes.count)},
-                    {blocked, static_cast<std::size_t>(nodes.count)});
-    float sum = 0;
-    for (int k = 0; k < nodes.count; ++k) {
-      if (blocked[k] || !node_is_exposed_[first + nodes.node[k]]) nodes.weight[k] = 0;
-      sum += nodes.weight[k];
-    }
-    if (sum < 1e-3f) {
-      const int patch = patch_of_slot_[mesh_->slot_index(face, side, point.cell)];
-      if (patch < 0) return {};
-      SparseRows const& sky = patch_sky_;
-      const glm::vec3 from_sky = sky_light(sky, static_cast<std::size_t>(patch));
-      const glm::vec3 smooth = form_factors_.dot(static_cast<std::size_t>(patch), lighting_.patch_smooth_radiosity);
-      const glm::vec3 normal = side == 0 ? faces_.faces[face].normal : -faces_.faces[face].normal;
-      return {glm::vec3(0), from_sky, smooth + first_bounce_->irradiance(lifted_point, normal)};
-    }
-    for (int k = 0; k < nodes.count; ++k) nodes.weight[k] /= sum;
-  }
+  const NodeShares shares = nodes_->interpolate(face, side, st, lifted_point);
   Irradiance result;
-  for (int k = 0; k < nodes.count; ++k) {
-    result.sky += nodes.weight[k] * lighting_.node_sky[first + nodes.node[k]];
-    result.indirect += nodes.weight[k] * lighting_.node_indirect[first + nodes.node[k]];
+  if (shares.count == 0) {  // no node can speak for the point: its patch does
+    const int patch = patch_of_slot_[mesh_->slot_index(face, side, mesh_->grid(face).locate(st).cell)];
+    if (patch < 0) return result;
+    const glm::vec3 normal = side == 0 ? faces_.faces[face].normal : -faces_.faces[face].normal;
+    result.sky = sky_light(patch_sky_, static_cast<std::size_t>(patch));
+    result.indirect = form_factors_.dot(static_cast<std::size_t>(patch), lighting_.patch_smooth_radiosity) +
+                      first_bounce_->irradiance(lifted_point, normal);
+    return result;
+  }
+  for (int k = 0; k < shares.count; ++k) {
+    result.sky += shares.weight[k] * lighting_.node_sky[shares.node[k]];
+    result.indirect += shares.weight[k] * lighting_.node_indirect[shares.node[k]];
   }
   return result;
 }

@@ -8,7 +8,6 @@
 namespace transom {
 namespace {
 
-constexpr float kNodeInset = 0.02f;  // of a cell: keeps nodes out of the surfaces that meet the face at its edges
 constexpr int kMaximumDivisions = 512;
 
 int divisions(float length, float maximum_edge) {
@@ -78,20 +77,6 @@ glm::vec3 LightMesh::lifted_position(int face, Side side, glm::vec2 st) const {
   const Face& f = faces_->faces[static_cast<std::size_t>(face)];
   const float lift = side == 0 ? faces_->ray_offset() : -faces_->ray_offset();
   return f.position(st) + lift * f.normal;
-}
-
-Node LightMesh::node(int face, Side side, int node) const {
-  const Grid& g = grid(face);
-  const Face& f = faces_->faces[static_cast<std::size_t>(face)];
-  glm::vec2 st = g.node_parameters(node);
-  if (g.is_quad) {
-    const glm::vec2 inset = kNodeInset / glm::vec2(g.u_count, g.v_count);
-    st = glm::clamp(st, inset, 1.f - inset);
-  } else {
-    st = glm::mix(st, glm::vec2(1.f / 3), kNodeInset / static_cast<float>(g.u_count));
-  }
-  const glm::vec3 normal = f.shading_normal(st);
-  return {lifted_position(face, side, st), side == 0 ? normal : -normal};
 }
 
 glm::vec2 LightMesh::sample_local(int face, glm::vec2 u) const { return grid(face).is_quad ? u : sample_triangle(u); }

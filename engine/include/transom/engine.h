@@ -11,6 +11,7 @@
 #include "transom/gather.h"
 #include "transom/geometry.h"
 #include "transom/light_mesh.h"
+#include "transom/node_field.h"
 #include "transom/ray_scene.h"
 #include "transom/sky.h"
 #include "transom/trace.h"
@@ -25,6 +26,7 @@ struct SolveOptions {
   int elements_per_edge = 4;     ///< a patch has the square of it
   GatherSamples patch_samples{512, 128};
   GatherSamples node_samples{2048, 512};
+  float node_spacing = 6;        ///< of nodes, against the harmonic mean distance of what a cell sees
   double tolerance = 1e-6;       ///< flux in flight at which interreflection stops, relative
   std::uint32_t seed = 1;
   bool trace = false;
@@ -111,8 +113,8 @@ class Engine {
   void mark_interior(const std::vector<GatherRow>& rows);
   void check_closed(const std::vector<GatherRow>& rows);
   void assemble_transfer(std::vector<GatherRow>& rows);
-  void gather_nodes();
-  void find_split_cells();
+  std::vector<int> cell_divisions(const std::vector<GatherRow>& rows) const;
+  void gather_nodes(const std::vector<int>& divisions);
   std::vector<Share> to_patches(const std::vector<Share>& elements) const;
   glm::vec3 sky_light(const SparseRows& rows, std::size_t row) const;
   glm::vec3 element_radiosity(int element) const;
@@ -137,12 +139,9 @@ class Engine {
   std::vector<char> is_interior_;
   SparseRows form_factors_, through_, patch_sky_;
 
-  // Nodes of every face side that takes part.
-  std::vector<int> first_node_;     // by 2 * face + side; -1: none
-  std::vector<Node> nodes_;
-  std::vector<char> node_is_exposed_;
+  // Where light is shown.
+  std::unique_ptr<NodeField> nodes_;
   SparseRows node_sky_, node_patches_;
-  std::vector<char> is_split_;      // by slot: something stands between the nodes of the cell
 
   Lighting lighting_;
 };

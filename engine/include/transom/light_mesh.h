@@ -1,4 +1,4 @@
-/// @file The subdivision of faces on which light is held: patches exchange it, elements resolve it, nodes show it.
+/// @file The subdivision of faces on which light is held: patches exchange it, elements resolve where beams fall.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -16,10 +16,10 @@ struct Slot {
   int cell;  ///< within the face's grid
 };
 
-/// A point at which irradiance is gathered: a corner of cells, on one side of a face, slightly inside the face.
+/// A point at which irradiance is gathered.
 struct Node {
-  glm::vec3 position{0};  ///< lifted off the surface by Faces::ray_offset
-  glm::vec3 normal{0};    ///< shading normal of the side
+  glm::vec3 position{0};  ///< lifted off its surface by Faces::ray_offset
+  glm::vec3 normal{0};    ///< unit; on a surface the shading normal of its side
 };
 
 /// Grids over all faces: cells no longer than a maximum edge, each split into elements_per_edge^2 elements.
@@ -51,9 +51,6 @@ class LightMesh {
 
   /// Point of a face lifted off one side, from where rays may start.
   glm::vec3 lifted_position(int face, Side side, glm::vec2 st) const;
-
-  /// Node number `node` of the face's grid, as seen from `side`.
-  Node node(int face, Side side, int node) const;
 
   /// Maps two uniform numbers to the local parameters of a cell or element, uniform in area for congruent cells.
   glm::vec2 sample_local(int face, glm::vec2 u) const;
