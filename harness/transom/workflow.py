@@ -15,6 +15,7 @@ from transom.bundle import Bundle, find_bundle, make_case
 from transom.compare import CaseNames, ImageComparison, SensorComparison, compare_images, compare_sensors
 from transom.comparison import (
     COMPARISON_FORMAT,
+    AnalyticComparison,
     Comparison,
     MethodAgreement,
     compare_methods,
@@ -24,7 +25,7 @@ from transom.comparison import (
 from transom.errors import InputError
 from transom.files import write_atomic
 from transom.judge import Missing, Outcome, Verdict, exit_code, judge, read_tolerances
-from transom.known_answers import compare_known_answers
+from transom.known_answers import compare_known_answer
 from transom.progress import CaseProgress
 from transom.renderer import Renderer, load_renderer
 from transom.run import Question, coarse_options, engine_questions, render_case
@@ -86,14 +87,19 @@ def render_suite(suite: Suite, *, fresh: bool = False) -> list[Crash]:
             bars.begin(_question_words(question))
             try:
                 bundle = render_case(renderer, question, progress=bars.update, fresh=fresh)
-            except InputError:
-                raise
             except Exception as error:
-                crashes.append(Crash(question, "".join(traceback.format_exception_only(error)).strip()))
+                crashes.append(Crash(question, error_words(error)))
                 bars.finish(f"crashed: {crashes[-1].message}")
             else:
                 bars.finish(f"{bundle.record.wall_seconds:.1f} s")
     return crashes
+
+
+def error_words(error: Exception) -> str:
+    """An error as one line: bad input in its own words, anything else with its kind."""
+    if isinstance(error, InputError):
+        return str(error)
+    return " ".join("".join(traceback.format_exception_only(error)).split())
 
 
 def _question_words(question: Question) -> str:
@@ -110,7 +116,7 @@ def compare_finished(name: str, build: Path) -> Comparison:
 def compare_suite(suite: Suite, build: Path, crashes: Collection[Crash]) -> Comparison:
     """Compares every case with its reference and writes comparison.json."""
     if suite.reference == "closed_form":
-        comparison = Comparison(COMPARISON_FORMAT, suite.name, suite.title, analytic=compare_known_answers(suite))
+        comparison = _compare_with_truth(suite)
     else:
         comparison = _compare_with_mitsuba(suite, {crash.question.case.key: crash.message for crash in crashes})
     write_comparison(comparison_file(suite.name, build), comparison)
@@ -153,6 +159,20 @@ class _Found:
     sensors: list[SensorComparison]
     agreements: list[MethodAgreement]
     missing: list[Missing]
+
+
+def _compare_with_truth(suite: Suite) -> Comparison:
+    """Scenes with a known answer; one that fails does not stop the others."""
+    renderer = load_renderer(ENGINE)
+    rows: list[AnalyticComparison] = []
+    missing: list[Missing] = []
+    for entry in suite.cases:
+        try:
+            rows += compare_known_answer(entry, renderer)
+        except Exception as error:
+            place = (entry.scene.name, "", entry.condition.name, "")
+            missing.append(Missing(Outcome.CRASHED, *place, error_words(error)))
+    return Comparison(COMPARISON_FORMAT, suite.name, suite.title, analytic=tuple(rows), missing=tuple(missing))
 
 
 def _compare_with_mitsuba(suite: Suite, crashed: Mapping[str, str]) -> Comparison:
