@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +23,8 @@ from transom.run import Question, Target, render_case
 from transom.scene.model import Scene
 from transom.sensor_file import read_sensors, scene_sensors
 from transom.visible import FirstSurfaces
+
+HARNESS = str(Path(__file__).resolve().parents[2] / "harness")
 
 
 @pytest.fixture(autouse=True)
@@ -129,6 +135,37 @@ def test_killed_reference_goes_on_where_it_was_and_gives_the_same_answer() -> No
     assert bundle.record.facts["batches_resumed"] == 11
     at_once = render_case(NoisyRenderer(), question, repository_store(), fresh=True)
     np.testing.assert_array_equal(bundle.image().mean, at_once.image().mean)
+
+
+def test_reference_killed_at_any_moment_leaves_only_whole_files() -> None:
+    """Kills a process that renders references without end, and finds every batch and bundle whole."""
+    script = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from harness_fakes import NoisyRenderer, small_condition, small_scene
+from transom.bundle import make_case, repository_store
+from transom import run
+run._image_percent = lambda *_: 1.0
+scene = small_scene()
+for seed in range(1_000_000):
+    case = make_case(scene, small_condition(), NoisyRenderer(), {"seed": seed, "batches": 6}, view=scene.views[0])
+    run.render_case(NoisyRenderer(), run.Question(case), repository_store(), keep_batches=True)
+    print("one is finished", flush=True)
+"""
+    for delay_s in (0.05, 0.21, 0.4):
+        command = [sys.executable, "-c", script, str(Path(__file__).parent)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": HARNESS}) as process:
+            assert process.stdout is not None
+            process.stdout.readline()
+            time.sleep(delay_s)
+            process.kill()
+    for path in cache_store().root.rglob("*.npz"):
+        if not path.name.startswith("."):
+            assert BatchStore(path.parent).load(int(path.stem))["values"].shape == (8, 12)
+    bundles = [bundle for folder in repository_store().root.iterdir() if (bundle := read_bundle(folder))]
+    assert bundles
+    for bundle in bundles:
+        bundle.image()
 
 
 def test_folder_without_record_is_unfinished_and_damaged_picture_is_noticed() -> None:
