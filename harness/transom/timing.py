@@ -18,7 +18,11 @@ from transom.files import write_atomic
 from transom.scene.model import ConditionSpec, Scene
 from transom.suite import invalid_field, resized
 
-SOLVE_REPEATS, RELIGHT_REPEATS, FRAME_REPEATS = 3, 24, 24
+SOLVE_REPEATS, RELIGHT_REPEATS, FRAME_REPEATS = 3, 32, 32
+LEAST_REPEATS = 2
+TIME_BUDGET_S = 12.0
+"""Repeats of one quantity end after so many seconds, once there are LEAST_REPEATS: a report is to take minutes."""
+
 FRAME_SIZE = (640, 480)
 PLOT_MONTHS = (1, 2, 3, 4, 5, 6, 7, 8)
 PLOT_HOURS = (9, 10, 11, 12, 13, 14, 15, 16)
@@ -66,13 +70,13 @@ def time_scene(name: str) -> list[Timing]:
 
     scene = load_scene(name)
     triangles = len(scene.mesh.triangles()[0])
-    engine, solves = None, []
-    for _ in range(SOLVE_REPEATS):
-        begin = time.perf_counter()
-        engine = Engine.solve(scene)
-        solves.append(time.perf_counter() - begin)
-    if engine is None:
-        raise ValueError("nothing was solved")
+    solved: list[Engine] = []
+
+    def solve(_: int) -> None:
+        solved[:] = [Engine.solve(scene)]
+
+    solves = repeat(solve, SOLVE_REPEATS)
+    engine = solved[0]
     patches = int(engine.facts()["patches"])
     conditions = [resolve_condition(spec, scene.site) for spec in scene.conditions]
     view = resized(scene.views[0], *FRAME_SIZE)
@@ -80,14 +84,6 @@ def time_scene(name: str) -> list[Timing]:
     def row(quantity: Quantity, samples: Sequence[float], size: tuple[int, int] = (0, 0), unit: str = "s") -> Timing:
         median, p95 = (float(value) for value in np.percentile(samples, [50, 95]))
         return Timing(name, quantity, unit, samples[0], median, p95, len(samples), triangles, patches, *size)
-
-    def repeat(action: Callable[[int], object], count: int) -> list[float]:
-        samples = []
-        for index in range(count):
-            begin = time.perf_counter()
-            action(index)
-            samples.append(time.perf_counter() - begin)
-        return samples
 
     rows = [row("solve", solves)]
     rows.append(row("relight", repeat(lambda i: engine.relight(conditions[i % len(conditions)]), RELIGHT_REPEATS)))
@@ -106,6 +102,18 @@ def time_scene(name: str) -> list[Timing]:
         rows.append(row("plot_8x8", repeat(plot, 1)))
     rows.append(row("peak_memory", [peak_memory_mib()], unit="MiB"))
     return rows
+
+
+def repeat(action: Callable[[int], object], count: int) -> list[float]:
+    """Seconds that each of `count` calls action(0), action(1), ... took; fewer when the time budget is spent."""
+    samples: list[float] = []
+    for index in range(count):
+        begin = time.perf_counter()
+        action(index)
+        samples.append(time.perf_counter() - begin)
+        if sum(samples) > TIME_BUDGET_S and len(samples) >= LEAST_REPEATS:
+            break
+    return samples
 
 
 def peak_memory_mib() -> float:

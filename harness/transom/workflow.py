@@ -206,7 +206,7 @@ def _compare_view(
         case = make_case(scene, condition, engine, {"visibility": visibility}, view=view)
         ours = find_bundle(case)
         if ours is None or case.key in crashed:
-            message = crashed.get(case.key, "not rendered: transom run " + ENGINE)
+            message = crashed.get(case.key, "not rendered: transom run")
             found.missing.append(Missing(Outcome.CRASHED, scene.name, view.name, condition.name, visibility, message))
             continue
         rendered[visibility] = ours
@@ -234,7 +234,7 @@ def _compare_sensors(
     if truth is None:
         found.missing.append(_no_reference(entry, "sensors"))
     if ours is None or case.key in crashed:
-        message = crashed.get(case.key, "not measured")
+        message = crashed.get(case.key, "not measured: transom run")
         found.missing.append(Missing(Outcome.CRASHED, scene.name, "sensors", condition.name, ENGINE, message))
     elif truth is not None:
         names = _names(entry, "", "rays", ours, truth)
