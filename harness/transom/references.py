@@ -15,6 +15,9 @@ from transom.suite import load_suite, read_suites
 
 REFERENCE_RENDERER = "mitsuba"
 
+SENSOR_WORK_PIXELS = 4000
+"""A scene's sensors take about the time of so many pixels to 1 %; used for the remaining time alone."""
+
 STAGES = (4.0, 2.0, 1.0)
 """Multiples of the wanted noise, in the order in which all cases are brought to them."""
 
@@ -41,10 +44,13 @@ def run_references(scenes: Collection[str], *, fresh: bool = False) -> None:
     renderer = load_renderer(REFERENCE_RENDERER)
     questions = published_questions(scenes)
     store = repository_store()
-    with CaseProgress(len(questions) * len(STAGES), Console(stderr=True)) as bars:
-        for stage, question in ((stage, question) for stage in STAGES for question in questions):
+    steps = [(stage, question) for stage in STAGES for question in questions]
+    total = sum(_work(question, stage) for stage, question in steps)
+    with CaseProgress(len(steps), Console(stderr=True), total) as bars:
+        for stage, question in steps:
             target = replace(question.target, percent=stage * question.target.percent) if question.target else None
-            bars.begin(f"{question.case.label} to {target.percent if target else 0:g} %")
+            words = f"{question.case.label} to {target.percent:g} %" if target else question.case.label
+            bars.begin(words, _work(question, stage))
             is_fresh = fresh and stage == STAGES[0]
             bundle = render_case(
                 renderer, Question(question.case, target), store, bars.update, fresh=is_fresh, keep_batches=True
@@ -54,6 +60,15 @@ def run_references(scenes: Collection[str], *, fresh: bool = False) -> None:
             bars.finish(f"has {noise:.3f} %, {facts['batches']} batches, {size / 1e6:.2f} MB")
     for question in questions:
         cache_store().drop_batches(question.case)
+
+
+def _work(question: Question, stage: float) -> float:
+    """Work of a step relative to others: paths, by pixels and wanted noise, after what the stage before has done."""
+    places = SENSOR_WORK_PIXELS if question.case.view is None else question.case.view.width * question.case.view.height
+    wanted = 1.0 if question.case.view is None or question.target is None else question.target.percent
+    position = STAGES.index(stage)
+    before = 1 / STAGES[position - 1] ** 2 if position else 0.0
+    return places / wanted**2 * (1 / stage**2 - before)
 
 
 def _stricter(question: Question, known: Question) -> bool:
