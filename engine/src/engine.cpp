@@ -19,6 +19,7 @@ constexpr int kMaximumSweeps = 20000;
 constexpr double kLeakTolerance = 2e-4;      // share of interior rays that may slip through the rounding of edges
 constexpr float kHollowShare = 0.25f;        // of first rays on the inside of a solid: then it is a room
 constexpr int kFirstRays = 64;               // per patch on openings and emitters, to find hollow components
+constexpr float kLeastDividedSize = 0.5f;    // of the longest edge of patches: smaller cells are fine enough as they are
 constexpr float kExposedNode = 0.5f;         // a node counts when at least this share of its rays is outside solids
 
 // Streams of random numbers: each use has its own.
@@ -204,7 +205,10 @@ void Engine::mark_interior(const std::vector<GatherRow>& rows) {
     is_interior_[patch] = 1;
     stack.push_back(patch);
   };
-  for (const int slot : first_slots()) mark(patch_of_slot_[slot]);
+  // An emitter that sees the sky is a lamp outdoors, or the outside of a luminous wall.
+  for (const int slot : first_slots())
+    if (scene_.materials[faces_.faces[mesh_->slot(slot).face].material].opening >= 0 || rows[patch_of_slot_[slot]].escaped == 0)
+      mark(patch_of_slot_[slot]);
   if (!scene_.point_sources.empty())
     for (std::size_t p = 0; p < rows.size(); ++p) mark(static_cast<int>(p));
   while (!stack.empty()) {
@@ -268,7 +272,8 @@ std::vector<int> Engine::cell_divisions(const std::vector<GatherRow>& rows) cons
     const Slot slot = mesh_->slot(slot_of_patch_[p]);
     const float size = std::sqrt(mesh_->cell_area(slot.face, slot.cell));
     const float wanted = size / (options_.node_spacing * std::max(rows[p].harmonic_distance, 1e-6f * faces_.extent));
-    divisions.push_back(wanted > 2 ? 4 : wanted > 1 ? 2 : 1);
+    const bool is_small = size < kLeastDividedSize * facts_.maximum_edge_m;
+    divisions.push_back(is_small ? 1 : wanted > 2 ? 4 : wanted > 1 ? 2 : 1);
   }
   return divisions;
 }

@@ -16,11 +16,17 @@ struct Box {
   glm::dvec3 low, high;
 };
 
-struct Pane {
+// A face that may cut others.
+struct Cutter {
   std::vector<glm::dvec3> corner;
   glm::dvec3 normal;
   Box box;
+  double least_share;  // of the cut, that the face itself must cover
 };
+
+constexpr double kTolerance = 1e-6;     // of the extent: how near two faces are that meet
+constexpr double kWallShare = 0.5;     // a wall that covers half of the cut parts what it stands on; furniture does not
+constexpr double kWallExtent2 = 1e-3;  // least area of a wall, against the square of the scene's extent
 
 Box box_of(const auto& corners, double margin, const auto& position) {
   Box box{position(corners[0]), position(corners[0])};
@@ -35,12 +41,12 @@ bool overlap(const Box& a, const Box& b) {
   return glm::all(glm::lessThanEqual(a.low, b.high)) && glm::all(glm::lessThanEqual(b.low, a.high));
 }
 
-// Length of the segment p q inside the pane's convex polygon, widened by the tolerance [Cyrus & Beck 1978].
-double length_inside(const Pane& pane, glm::dvec3 p, glm::dvec3 q, double tolerance) {
+// Length of the segment p q inside the cutter's convex polygon, widened by the tolerance [Cyrus & Beck 1978].
+double length_inside(const Cutter& cutter, glm::dvec3 p, glm::dvec3 q, double tolerance) {
   double from = 0, to = 1;
-  for (std::size_t k = 0; k < pane.corner.size(); ++k) {
-    const glm::dvec3 a = pane.corner[k], b = pane.corner[(k + 1) % pane.corner.size()];
-    const glm::dvec3 inward = glm::normalize(glm::cross(pane.normal, b - a));
+  for (std::size_t k = 0; k < cutter.corner.size(); ++k) {
+    const glm::dvec3 a = cutter.corner[k], b = cutter.corner[(k + 1) % cutter.corner.size()];
+    const glm::dvec3 inward = glm::normalize(glm::cross(cutter.normal, b - a));
     const double at_p = glm::dot(p - a, inward) + tolerance, at_q = glm::dot(q - a, inward) + tolerance;
     if (at_p < 0 && at_q < 0) return 0;
     const double crossing = at_p / (at_p - at_q);
@@ -50,12 +56,12 @@ double length_inside(const Pane& pane, glm::dvec3 p, glm::dvec3 q, double tolera
   return std::max(0.0, to - from) * glm::length(q - p);
 }
 
-// Cuts a convex polygon by the pane's plane where they meet. False: nothing to cut.
-bool cut(const Polygon& polygon, const Pane& pane, double tolerance, Polygon& front, Polygon& back) {
+// Cuts a convex polygon by the cutter's plane where they meet. False: nothing to cut.
+bool cut(const Polygon& polygon, const Cutter& cutter, double tolerance, Polygon& front, Polygon& back) {
   std::vector<double> distance;
   bool has_front = false, has_back = false;
   for (const Corner& c : polygon) {
-    distance.push_back(glm::dot(c.position - pane.corner[0], pane.normal));
+    distance.push_back(glm::dot(c.position - cutter.corner[0], cutter.normal));
     has_front |= distance.back() > tolerance;
     has_back |= distance.back() < -tolerance;
   }
@@ -78,12 +84,15 @@ bool cut(const Polygon& polygon, const Pane& pane, double tolerance, Polygon& fr
       on_plane.push_back(crossing.position);
     }
   }
-  return on_plane.size() >= 2 && length_inside(pane, on_plane[0], on_plane[1], 2 * tolerance) > 4 * tolerance;
+  if (on_plane.size() < 2) return false;
+  const double covered = length_inside(cutter, on_plane[0], on_plane[1], 2 * tolerance);
+  return covered > 4 * tolerance && covered >= cutter.least_share * glm::length(on_plane[1] - on_plane[0]);
 }
 
 }  // namespace
 
-std::vector<FacePiece> cut_at_openings(const SceneGeometry& scene, glm::dvec3 origin, double tolerance) {
+std::vector<FacePiece> cut_faces(const SceneGeometry& scene, glm::dvec3 origin, double extent) {
+  const double tolerance = kTolerance * extent;
   const auto polygon_of = [&](std::size_t f) {
     Polygon polygon;
     const glm::ivec4& face = scene.faces[f];
@@ -94,17 +103,21 @@ std::vector<FacePiece> cut_at_openings(const SceneGeometry& scene, glm::dvec3 or
     }
     return polygon;
   };
-  std::vector<Pane> panes;
+  std::vector<Cutter> cutters;
   for (std::size_t f = 0; f < scene.faces.size(); ++f) {
-    if (scene.materials[scene.face_material[f]].opening < 0) continue;
     const Polygon polygon = polygon_of(f);
-    Pane pane;
-    for (const Corner& c : polygon) pane.corner.push_back(c.position);
-    pane.normal = glm::normalize(glm::cross(pane.corner[2] - pane.corner[0], pane.corner.back() - pane.corner[1]));
-    if (polygon.size() == 3)
-      pane.normal = glm::normalize(glm::cross(pane.corner[1] - pane.corner[0], pane.corner[2] - pane.corner[0]));
-    pane.box = box_of(pane.corner, 2 * tolerance, [](const glm::dvec3& p) { return p; });
-    panes.push_back(std::move(pane));
+    const bool is_opening = scene.materials[scene.face_material[f]].opening >= 0;
+    Cutter cutter;
+    for (const Corner& c : polygon) cutter.corner.push_back(c.position);
+    const glm::dvec3 twice_area = glm::cross(cutter.corner[1] - cutter.corner[0], cutter.corner[2] - cutter.corner[0]) +
+                                  (polygon.size() == 4 ? glm::cross(cutter.corner[2] - cutter.corner[0],
+                                                                    cutter.corner[3] - cutter.corner[0])
+                                                       : glm::dvec3(0));
+    if (!(glm::length(twice_area) > (is_opening ? 0.0 : 2 * kWallExtent2 * extent * extent))) continue;
+    cutter.normal = glm::normalize(twice_area);
+    cutter.box = box_of(cutter.corner, 2 * tolerance, [](const glm::dvec3& p) { return p; });
+    cutter.least_share = is_opening ? 0.0 : kWallShare;
+    cutters.push_back(std::move(cutter));
   }
 
   std::vector<FacePiece> pieces;
@@ -113,10 +126,10 @@ std::vector<FacePiece> cut_at_openings(const SceneGeometry& scene, glm::dvec3 or
     std::vector<Polygon> parts{polygon_of(f)};
     if (scene.materials[scene.face_material[f]].opening < 0) {
       const Box box = box_of(parts[0], 0.0, [](const Corner& c) { return c.position; });
-      for (const Pane& pane : panes) {
-        if (!overlap(box, pane.box)) continue;
+      for (const Cutter& cutter : cutters) {
+        if (!overlap(box, cutter.box)) continue;
         for (std::size_t k = 0, count = parts.size(); k < count; ++k)
-          if (cut(parts[k], pane, tolerance, front, back)) {
+          if (cut(parts[k], cutter, tolerance, front, back)) {
             parts[k] = front;
             parts.push_back(back);
           }

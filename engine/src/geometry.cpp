@@ -15,7 +15,6 @@ namespace transom {
 namespace {
 
 constexpr float kMaximumReflectance = 0.999f;
-constexpr double kCutTolerance = 1e-6;  // of the extent: how near an opening is to a face that it meets
 
 template <typename... Parts>
 [[noreturn]] void fail(const Parts&... parts) {
@@ -179,7 +178,7 @@ Faces make_faces(const SceneGeometry& scene) {
   if (!(result.extent > 0)) fail("the scene has no extent");
 
   const double extent = result.extent;
-  for (const FacePiece& piece : cut_at_openings(scene, result.origin, kCutTolerance * extent)) {
+  for (const FacePiece& piece : cut_faces(scene, result.origin, extent)) {
     Face& face = result.faces.emplace_back();
     face.source = piece.source;
     face.is_quad = piece.is_quad;

@@ -7,7 +7,11 @@
 namespace transom {
 namespace {
 
-constexpr int kMaximumScalings = 50;
+// A trace of exchange of each patch with itself. It makes the scaling possible for every scene (the matrix then has total
+// support), and takes up what a patch in a gap cannot give to others.
+constexpr float kSelfShare = 1e-5f;
+
+constexpr int kMaximumScalings = 100;
 constexpr double kRowSumTolerance = 1e-7;
 constexpr double kLargestStep = 1.0;         // of a logarithm of a scale
 constexpr int kMaximumGradientSteps = 300;
@@ -48,6 +52,10 @@ SparseRows average_both_ways(const SparseRows& exchange, const std::vector<float
       const float mean = own_say * forth + (1 - own_say) * back;
       sum += mean;
       row.push_back({index, mean});
+    }
+    if (!row.empty()) {
+      row.push_back({static_cast<int>(i), kSelfShare * areas[i]});
+      merge_shares(row);
     }
     result.append(row);
   }

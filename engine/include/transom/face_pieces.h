@@ -1,4 +1,4 @@
-/// @file Faces cut where an opening meets them, so that no piece lies partly indoors and partly outdoors.
+/// @file Faces cut where openings and walls meet them, so that no piece lies on both sides of one.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -16,8 +16,9 @@ struct FacePiece {
   glm::vec3 corner_normal[4];
 };
 
-/// Pieces of all faces, in the order of the faces. A window reveal that passes the plane of its pane is cut there: each
-/// opaque face is cut by the plane of every opening face whose polygon it meets, within `tolerance` [m].
-std::vector<FacePiece> cut_at_openings(const SceneGeometry& scene, glm::dvec3 origin, double tolerance);
+/// Pieces of all faces, in the order of the faces. A window reveal that passes the plane of its pane is cut there, and a
+/// floor where a wall stands on it: an opaque face is cut by the plane of every opening that it meets, and of every large
+/// face that covers at least half of the cut. extent: size of the scene [m].
+std::vector<FacePiece> cut_faces(const SceneGeometry& scene, glm::dvec3 origin, double extent);
 
 }  // namespace transom

@@ -49,7 +49,7 @@ struct SceneGeometry {
 /// One side of a face. 0: front, the side its normal looks to; 1: back.
 using Side = int;
 
-/// A face, or the piece of one that an opening leaves on one side, in the engine's own frame: single precision, relative
+/// A face, or a piece of one (see face_pieces.h), in the engine's own frame: single precision, relative
 /// to the middle of the scene.
 struct Face {
   glm::vec3 corner[4];
@@ -84,7 +84,7 @@ struct Faces {
   float ray_offset() const { return 1e-5f * extent; }
 };
 
-/// Recentres the scene in double precision, cuts faces at openings, then finds normals, areas and closed solids.
+/// Recentres the scene in double precision, cuts faces at openings and walls, then finds normals, areas and closed solids.
 Faces make_faces(const SceneGeometry& scene);
 
 }  // namespace transom

@@ -1,0 +1,165 @@
+#include "transom/engine.h"
+
+#include <gtest/gtest.h>
+#include <oneapi/tbb/global_control.h>
+
+#include <numbers>
+
+#include "rooms.h"
+#include "transom/error.h"
+#include "transom/frame.h"
+
+namespace transom {
+namespace {
+
+using test::add_box;
+using test::diffuse;
+using test::roof_light_room;
+using test::tregenza;
+using test::uniform_sky;
+
+constexpr GatherSamples kSensorSamples{4096, 4096};
+
+SolveOptions small_options() {
+  SolveOptions options;
+  options.target_patch_count = 600;
+  options.patch_samples = {256, 128};
+  options.node_samples = {256, 256};
+  return options;
+}
+
+TEST(Engine, SkyThroughARoofLightMatchesTheClosedForm) {
+  Engine engine(roof_light_room(0), tregenza(), small_options());
+  engine.relight(uniform_sky(1000));
+  // Under the middle of a 2 x 2 m hole at 3 m: four corners of 1 x 1 at 3.
+  const double x = 1.0 / 3, root = std::sqrt(1 + x * x);
+  const double integral = 4 * 0.5 * 2 * (x / root * std::atan(x / root));
+  const auto e = engine.illuminance({{2, 2, 0}}, {{0, 0, 1}}, kSensorSamples);
+  EXPECT_NEAR(e[0].sky.y / (1000 * integral), 1, 2e-3);
+  EXPECT_EQ(e[0].indirect.y, 0);
+}
+
+TEST(Engine, GlassTakesItsShareOnce) {
+  Engine clear(roof_light_room(0), tregenza(), small_options()), tinted(roof_light_room(0, 0.5f), tregenza(), small_options());
+  clear.relight(uniform_sky(1000));
+  tinted.relight(uniform_sky(1000));
+  const auto a = clear.illuminance({{1, 2, 0}}, {{0, 0, 1}}, kSensorSamples);
+  const auto b = tinted.illuminance({{1, 2, 0}}, {{0, 0, 1}}, kSensorSamples);
+  EXPECT_NEAR(b[0].sky.y, 0.5f * a[0].sky.y, 1e-3f * a[0].sky.y);
+}
+
+TEST(Engine, FluxInIsFluxAbsorbedAndOut) {
+  Engine engine(roof_light_room(0.6f, 0.8f), tregenza(), small_options());
+  Condition condition = uniform_sky(5000, 800);
+  condition.beams.push_back({glm::normalize(glm::vec3(0.2f, 0.3f, 1)), glm::vec3(80000)});
+  engine.relight(condition);
+  const EnergyAudit audit = engine.audit(1 << 16);
+  EXPECT_GT(audit.in_beams.y, 0);
+  EXPECT_NEAR((audit.absorbed + audit.out).y / audit.in().y, 1, 1e-3);
+}
+
+TEST(Engine, RelightingIsTheSameAsSolvingAfresh) {
+  Engine engine(roof_light_room(0.5f), tregenza(), small_options()), fresh(roof_light_room(0.5f), tregenza(), small_options());
+  Condition sunny = uniform_sky(3000);
+  sunny.beams.push_back({glm::normalize(glm::vec3(0.3f, 0.1f, 1)), glm::vec3(60000)});
+  engine.relight(sunny);
+  engine.relight(uniform_sky(1234));
+  fresh.relight(uniform_sky(1234));
+  EXPECT_EQ(engine.lighting().node_indirect, fresh.lighting().node_indirect);
+  EXPECT_EQ(engine.lighting().node_sky, fresh.lighting().node_sky);
+}
+
+TEST(Engine, LightAddsUp) {
+  Engine engine(roof_light_room(0.5f), tregenza(), small_options());
+  Condition sky = uniform_sky(2000), sun = uniform_sky(0), both = uniform_sky(2000);
+  sun.beams.push_back({glm::normalize(glm::vec3(0.1f, 0.3f, 1)), glm::vec3(50000)});
+  both.beams = sun.beams;
+  const std::vector<glm::dvec3> points{{0.5, 0.5, 0}, {2, 2, 0}, {3.5, 1, 0}};
+  const std::vector<glm::vec3> up(3, {0, 0, 1});
+  std::vector<double> total;
+  for (const Condition* condition : {&sky, &sun, &both}) {
+    engine.relight(*condition);
+    double sum = 0;
+    for (const Irradiance& e : engine.illuminance(points, up, kSensorSamples)) sum += (e.direct + e.sky + e.indirect).y;
+    total.push_back(sum);
+  }
+  EXPECT_NEAR((total[0] + total[1]) / total[2], 1, 1e-5);
+}
+
+TEST(Engine, AnswerDoesNotDependOnThreads) {
+  std::vector<std::vector<glm::vec3>> answers;
+  for (const std::size_t threads : {1u, 2u, 4u}) {
+    const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, threads);
+    Engine engine(roof_light_room(0.5f), tregenza(), small_options());
+    Condition condition = uniform_sky(2000);
+    condition.beams.push_back({glm::normalize(glm::vec3(0.1f, 0.3f, 1)), glm::vec3(50000)});
+    engine.relight(condition);
+    answers.push_back(engine.lighting().node_indirect);
+  }
+  EXPECT_EQ(answers[0], answers[1]);
+  EXPECT_EQ(answers[0], answers[2]);
+}
+
+TEST(Engine, OpenWallIsNamedWithItsPlace) {
+  SceneGeometry scene = roof_light_room(0.5f);
+  scene.faces.erase(scene.faces.begin() + 1);
+  scene.face_material.erase(scene.face_material.begin() + 1);
+  try {
+    Engine engine(scene, tregenza(), small_options());
+    FAIL() << "an open wall went unnoticed";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("open wall"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Engine, OpeningThatLooksIndoorsIsRefused) {
+  SceneGeometry scene = roof_light_room(0.5f);
+  glm::ivec4& pane = scene.faces.back();
+  pane = {pane.w, pane.z, pane.y, pane.x};
+  EXPECT_THROW(Engine(scene, tregenza(), small_options()), InputError);
+}
+
+TEST(Engine, ClosedEmittingBoxIsAFurnace) {
+  for (const float rho : {0.f, 0.5f, 0.9f}) {
+    SceneGeometry scene;
+    scene.materials = {{glm::vec3(rho), glm::vec3(100), false, -1}};
+    add_box(scene, {0, 0, 0}, {3, 4, 5}, 0, true);
+    Engine engine(scene, tregenza(), small_options());
+    engine.relight(uniform_sky(0));
+    const auto e = engine.illuminance({{1, 1, 1}}, {{0, 0, 1}}, kSensorSamples);
+    EXPECT_NEAR(e[0].indirect.y / (std::numbers::pi * 100 / (1 - rho)), 1, 1e-3) << rho;
+  }
+}
+
+TEST(Frame, ComponentsAddUpAndAFurnaceIsEvenlyBright) {
+  SceneGeometry scene;
+  scene.materials = {{glm::vec3(0.5f), glm::vec3(100), false, -1}};
+  add_box(scene, {0, 0, 0}, {3, 4, 5}, 0, true);
+  Engine engine(scene, tregenza(), small_options());
+  engine.relight(uniform_sky(0));
+  FrameRenderer renderer(engine);
+  View view;
+  view.position = {0.5, 0.5, 0.5};
+  view.target = {3, 4, 4};
+  view.width = 32;
+  view.height = 24;
+  const Frame frame = renderer.render(view, {});
+  for (std::size_t p = 0; p < frame.radiance.size(); ++p) {
+    EXPECT_NEAR(frame.radiance[p].y, 200, 0.2);
+    const glm::vec3 sum = frame.sun[p] + frame.sky[p] + frame.indirect[p] + frame.emitted[p] + frame.exterior[p];
+    EXPECT_NEAR(frame.radiance[p].y, sum.y, 1e-3);
+  }
+}
+
+TEST(Engine, PartitionCastsNoLightThroughItself) {
+  // A sheet from floor to ceiling parts the room; the side without the roof light is dark.
+  SceneGeometry scene = roof_light_room(0.5f);
+  test::add_quad(scene, {3.5, 0, 0}, {3.5, 4, 0}, {3.5, 4, 3}, {3.5, 0, 3}, 0);
+  Engine engine(scene, tregenza(), small_options());
+  engine.relight(uniform_sky(10000));
+  const auto e = engine.illuminance({{3.75, 2, 0}, {2, 2, 0}}, {{0, 0, 1}, {0, 0, 1}}, kSensorSamples);
+  EXPECT_LT((e[0].sky + e[0].indirect).y, 1e-3f * e[1].sky.y);
+}
+
+}  // namespace
+}  // namespace transom

@@ -1,0 +1,77 @@
+#include "transom/sampling.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <set>
+
+namespace transom {
+namespace {
+
+TEST(Sobol, EveryElementaryIntervalOfANetHoldsOnePoint) {
+  const SobolSequence points(7);
+  for (int log_x = 0; log_x <= 6; ++log_x) {
+    const int nx = 1 << log_x, ny = 64 / nx;
+    std::set<std::pair<int, int>> cells;
+    for (std::uint32_t i = 0; i < 64; ++i) {
+      const glm::vec2 u = points.point2(i);
+      cells.insert({static_cast<int>(u.x * static_cast<float>(nx)), static_cast<int>(u.y * static_cast<float>(ny))});
+    }
+    EXPECT_EQ(cells.size(), 64u) << nx << " x " << ny;
+  }
+}
+
+TEST(Sobol, FourDimensionsAreEachStratified) {
+  const SobolSequence points(3);
+  for (int d = 0; d < 4; ++d) {
+    std::set<int> strata;
+    for (std::uint32_t i = 0; i < 256; ++i) strata.insert(static_cast<int>(points.point4(i)[d] * 256));
+    EXPECT_EQ(strata.size(), 256u) << "dimension " << d;
+  }
+}
+
+TEST(Hemisphere, CosineSamplesHaveMeanCosineTwoThirds) {
+  const SobolSequence points(1);
+  double sum = 0;
+  constexpr int kCount = 4096;
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    const glm::vec3 d = sample_cosine_hemisphere(points.point2(i));
+    EXPECT_NEAR(glm::length(d), 1, 1e-5);
+    sum += d.z;
+  }
+  EXPECT_NEAR(sum / kCount, 2.0 / 3, 1e-3);
+}
+
+TEST(Frame, IsRightHandedForEveryNormal) {
+  for (const glm::vec3 n : {glm::vec3(0, 0, 1), glm::vec3(0, 0, -1), glm::normalize(glm::vec3(1, -2, 0.5f))}) {
+    const glm::mat3 frame = frame_from_normal(n);
+    EXPECT_NEAR(glm::determinant(frame), 1, 1e-5);
+    EXPECT_NEAR(glm::length(frame[2] - n), 0, 1e-6);
+  }
+}
+
+TEST(SphericalTriangle, OctantHasAnEighthOfTheSphere) {
+  EXPECT_NEAR(SphericalTriangle({1, 0, 0}, {0, 1, 0}, {0, 0, 1}).solid_angle(), std::numbers::pi / 2, 1e-12);
+}
+
+TEST(SphericalTriangle, SamplesLieInsideAndHaveTheOctantsMean) {
+  const SphericalTriangle octant({1, 0, 0}, {0, 1, 0}, {0, 0, 1});
+  const SobolSequence points(5);
+  glm::dvec3 sum(0);
+  constexpr int kCount = 4096;
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    const glm::dvec3 d = octant.sample(points.point2(i));
+    EXPECT_NEAR(glm::length(d), 1, 1e-9);
+    EXPECT_GE(std::min({d.x, d.y, d.z}), -1e-9);
+    sum += d;
+  }
+  // The mean of x over the octant is 1/2.
+  for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(sum[axis] / kCount, 0.5, 1e-3);
+}
+
+TEST(SphericalTriangle, DegenerateOneHasNoSolidAngle) {
+  EXPECT_EQ(SphericalTriangle({1, 0, 0}, {1, 0, 0}, {0, 0, 1}).solid_angle(), 0);
+}
+
+}  // namespace
+}  // namespace transom
