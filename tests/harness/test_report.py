@@ -145,7 +145,7 @@ class PageReader(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         values = dict(attrs)
-        if tag in ("script", "link", "iframe", "object"):
+        if tag in ("link", "iframe", "object") or (tag == "script" and "src" in values):
             self.sources.append(tag)
         if tag == "img":
             self.sources.append(str(values["src"]))
