@@ -18,7 +18,7 @@ INVERSE_PI = float(1.0 / np.pi)
 _TABLES: list[tuple[np.ndarray[Any, np.dtype[np.float32]], float]] = []
 
 
-class GlassBSDF(mi.BSDF):  # type: ignore[misc]
+class GlassBSDF(mi.BSDF):
     """Two lobes: null transmission from both sides, diffuse reflection of the back."""
 
     def __init__(self, props: Any) -> None:

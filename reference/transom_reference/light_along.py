@@ -6,11 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from transom_reference.mitsuba_setup import dr, mi
+from transom_reference.mitsuba_setup import dr, floats, mi
+from transom_reference.surface import gather4, offset
 from transom_reference.transport_scene import SKY_ROWS, TABLE_INTERVALS, TransportScene
-
-OFFSET = 5e-6
-"""Rays start this far from a surface, times 1 + the largest coordinate [m]: above float32 rounding of hit points."""
 
 UNROLLED_PORTALS = 64
 """Up to so many portals their weights are written out in the kernel; beyond, a loop reads them from the table."""
@@ -19,38 +17,22 @@ MAX_PANES = 32
 """Panes that one straight line may cross."""
 
 
-def gather4(table: Any, row: Any, active: Any) -> Any:
-    """Row of four floats of a flat table; `.xyz` and `.w` name its parts."""
-    return mi.Vector4f(dr.gather(mi.Vector4f, table, row, active))
-
-
-def offset(point: Any, normal: Any) -> Any:
-    """The point moved off its surface along the normal."""
-    largest = dr.maximum(dr.abs(point.x), dr.maximum(dr.abs(point.y), dr.abs(point.z)))
-    return mi.Point3f(point + normal * (OFFSET * (1.0 + largest)))
-
-
-def facing(normal: Any, direction: Any) -> Any:
-    """The normal turned against an arriving direction."""
-    return mi.Normal3f(dr.select(dr.dot(normal, direction) > 0.0, -normal, normal))
-
-
 class LightAlong:
     """Visibility, glass, sky and opening densities of one TransportScene."""
 
     def __init__(self, scene: TransportScene) -> None:
         self.scene = scene
-        self.sun_probability = mi.Float(scene.sun_portal_probability.astype(np.float32)) if scene.portals else None
+        self.sun_probability = floats(scene.sun_portal_probability) if scene.portals else None
         if scene.portals:
             points = np.stack([portal.weight_points for portal in scene.portals])
-            self.weight_points = mi.Float(np.ascontiguousarray(points, dtype=np.float32).ravel())
+            self.weight_points = floats(points)
             self.scales = np.array([p.area for p in scene.portals]) * np.maximum(scene.portal_weights, 1e-6) * 0.25
             # Portals that send nothing indoors are still possible: a tiny weight costs nothing and keeps W positive.
             self.softening = np.array([0.05 * p.area for p in scene.portals])
             rows = np.stack(
                 [self.scales, self.softening, np.zeros_like(self.scales), np.zeros_like(self.scales)], axis=1
             )
-            self.weight_rows = mi.Float(np.ascontiguousarray(rows, dtype=np.float32).ravel())
+            self.weight_rows = floats(rows)
 
     # -- sky and ground -------------------------------------------------------------------------------------------
 
@@ -168,7 +150,7 @@ class LightAlong:
     def outward(
         self, origin: Any, direction: Any, here: Any, normal: Any, weight_sum: Any, active: Any
     ) -> tuple[Any, Any, Any]:
-        """Transmittance to the sky (0: hidden), probability that a path's ray passes, opening-sampling density [1/sr]."""
+        """Transmittance to the sky (0: hidden), a ray's probability of passing, opening-sampling density [1/sr]."""
         active = self._clear(origin, direction, mi.Float(dr.inf), active)
         viewer = (here, normal, weight_sum)
         passed, probability, density = self._panes(origin, direction, mi.Float(dr.inf), active, viewer, False)

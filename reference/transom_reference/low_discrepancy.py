@@ -1,4 +1,4 @@
-"""Random numbers in [0, 1) for paths: scrambled, shuffled Sobol' pairs ("padding"), one hash per lane, batch and dimension.
+"""Random numbers in [0, 1) for paths: scrambled, shuffled Sobol' pairs, one hash per lane, batch and dimension.
 
 Each pair of dimensions is an independently Owen-scrambled (0, 2)-net over the samples of one batch, so a batch is an
 unbiased estimate by itself and batches with different seeds are independent.

@@ -15,7 +15,8 @@ from transom.errors import InputError
 from transom.renderer import ImageResult, Progress, SensorResult
 from transom.scene.model import Scene, View
 from transom_reference.mitsuba_setup import VARIANT, dr, mi
-from transom_reference.portal_integrator import CameraRays, PathOptions, SensorPoints, trace_batch
+from transom_reference.path_starts import CameraRays, SensorPoints
+from transom_reference.portal_integrator import PathOptions, PortalIntegrator
 from transom_reference.transport_scene import TransportScene, build_transport_scene
 
 Float64 = NDArray[np.float64]
@@ -47,7 +48,7 @@ class MitsubaRenderer:
         batches: independent estimates, at least 2; published references have 32 or more. seed: any integer.
         max_depth: surfaces and panes a path may meet. physics: "matched" (hard sun, diffuse room side of glass).
         """
-        return {"samples": 32, "batches": 32, "seed": 1, "max_depth": 512, "physics": "matched"}
+        return {"samples": 64, "batches": 32, "seed": 1, "max_depth": 512, "physics": "matched"}
 
     def render(
         self,
@@ -59,17 +60,17 @@ class MitsubaRenderer:
         *,
         batches: BatchStore | None = None,
     ) -> ImageResult:
-        """The view's image (height, width, 3) [cd/m²], its halves and standard error, from `options["batches"]` batches.
+        """The view's image (height, width, 3) [cd/m²], halves and standard error, from `options["batches"]` batches.
 
         batches: finished batches are loaded from here and new ones saved. Raises InputError for options out of range.
         """
         settings = self._settings(options)
         transport = build_transport_scene(scene, condition)
-        start = camera_rays(view)
         path = PathOptions(_log2(settings["samples"]), settings["max_depth"])
+        integrator = PortalIntegrator(transport, camera_rays(view), path)
 
         def trace(seed: int) -> NDArray[Any]:
-            return trace_batch(transport, start, path, seed).reshape(view.height, view.width, 3).astype(np.float32)
+            return integrator.batch(seed).reshape(view.height, view.width, 3).astype(np.float32)
 
         summary = _run_batches(trace, settings, batches, progress)
         facts = self._facts(settings, transport, summary)
@@ -100,7 +101,8 @@ class MitsubaRenderer:
         replicas = int(np.clip(SENSOR_LANES_PER_BATCH // len(points), 1, 1024))
         start = SensorPoints(points, normals, replicas)
         path = PathOptions(SENSOR_LOG2_SAMPLES, settings["max_depth"])
-        summary = _run_batches(lambda seed: trace_batch(transport, start, path, seed), settings, batches, progress)
+        integrator = PortalIntegrator(transport, start, path)
+        summary = _run_batches(integrator.batch, settings, batches, progress)
         facts = self._facts(settings, transport, summary)
         facts["paths_per_sensor"] = (replicas << SENSOR_LOG2_SAMPLES) * settings["batches"]
         return SensorResult(summary.mean, summary.standard_error, facts)

@@ -1,4 +1,4 @@
-"""The same scene for Mitsuba's own integrators, which cross-check ours: `volpath`, glass BSDF, envmap, directional sun."""
+"""The same scene for Mitsuba's own `volpath`, which cross-checks ours: glass BSDF, envmap, directional sun."""
 
 from __future__ import annotations
 

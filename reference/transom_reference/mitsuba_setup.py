@@ -10,6 +10,9 @@ from __future__ import annotations
 import ctypes.util
 import os
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 VARIANT = "llvm_ad_rgb"
 LLVM_VERSIONS = (19, 20, 21, 18, 17)
@@ -51,4 +54,23 @@ import mitsuba as mi  # noqa: E402
 mi.set_variant(VARIANT)
 dr.set_thread_count(_thread_count())
 
-__all__ = ["LLVM_VERSIONS", "VARIANT", "dr", "find_llvm", "mi"]
+
+def floats(array: Any) -> Any:
+    """A Dr.Jit array of float32 in memory of its own.
+
+    A plain conversion borrows NumPy's memory, whose alignment goes into the compiled kernel: it would be compiled
+    again for every array that happens to lie elsewhere.
+    """
+    borrowed = mi.Float(np.ascontiguousarray(array, dtype=np.float32).ravel())
+    owned = dr.empty(mi.Float, dr.width(borrowed))
+    dr.scatter(owned, borrowed, dr.arange(mi.UInt32, dr.width(borrowed)))
+    dr.eval(owned)
+    return owned
+
+
+def points(array: Any) -> list[Any]:
+    """Three Dr.Jit arrays of float32 from rows (N, 3): the arguments of mi.Point3f and its like."""
+    return [floats(array[:, column]) for column in range(3)]
+
+
+__all__ = ["LLVM_VERSIONS", "VARIANT", "dr", "find_llvm", "floats", "mi", "points"]

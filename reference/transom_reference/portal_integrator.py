@@ -1,16 +1,19 @@
 """Path tracing that samples the openings and the sun's patches: unbiased, two-sided diffuse surfaces, delta sun.
 
-At every diffuse vertex x four things are added, and a cosine-distributed ray finds the next vertex:
+At every diffuse vertex x these are added, and a cosine-distributed ray finds the next vertex:
 - the sun, by a shadow ray; its patches seen by the next ray count with a weight against the connections below;
 - sky and ground, by a point on an opening, chosen by an estimate of each opening's light at x;
-- one point y lit by the sun through an opening, from a list that is traced from the openings once a batch;
+- one point y lit by the sun through an opening, chosen from a list that is traced from the openings once a batch;
+- indoors, one light vertex: a place where a light path from the openings has landed (light_vertices.py);
 - one point source.
-Sky and sun patches are weighted against the cosine-distributed ray by the balance heuristic [Veach 1997, ch. 9], with the
-densities of all openings that a ray crosses, so that rays through two panes are right.
+Sky and sun patches are weighted against the cosine-distributed ray by the balance heuristic [Veach 1997, ch. 9], with
+the densities of all openings that a ray crosses, so that rays through two panes are right. All other light from indoor
+surfaces is divided between light vertices and rays by a weight that depends on the two places alone, c / (c + p) and
+p / (c + p) with p the density of the cosine-distributed ray: any such division is unbiased, and it bounds connections.
 
-Glass multiplies by its angular transmittance, both ways. Its room side (the back of the face) also reflects diffusely: a
-path is reflected with probability R / (T + R). Smooth surfaces use the interpolated normal for the cosine of arriving
-light and only light from the viewer's side of the true surface counts. Emitting surfaces are found by rays alone.
+Glass multiplies by its angular transmittance, both ways. Its room side (the back of the face) also reflects diffusely:
+a path is reflected with probability R / (T + R). Smooth surfaces use the interpolated normal for the cosine of arriving
+light, and only light from the viewer's side of the true surface counts. Emitting surfaces are found by rays alone.
 """
 
 from __future__ import annotations
@@ -21,39 +24,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from transom_reference.light_along import LightAlong, facing, gather4, offset
+from transom_reference.light_along import LightAlong
+from transom_reference.light_vertices import LightVertices, connection_density
 from transom_reference.low_discrepancy import lane_seed, pair
-from transom_reference.mitsuba_setup import dr, mi
-from transom_reference.sun_patches import SunPatches
+from transom_reference.mitsuba_setup import dr, floats, mi
+from transom_reference.path_starts import GivenRays, SensorPoints, Start, indoors
+from transom_reference.resampling import resample
+from transom_reference.sun_patches import SunPatches, pilot_multiplicity
+from transom_reference.surface import offset, surface_at
 from transom_reference.transport_scene import TransportScene
 
 INVERSE_PI = float(1.0 / np.pi)
-DIMENSION_PAIRS = 5
+DIMENSION_PAIRS = 6
 """Pairs of numbers that one step of a path uses."""
 
-
-@dataclass(frozen=True)
-class CameraRays:
-    """A pinhole camera: directions are forward + x·right + y·up with x, y in the image plane at distance 1.
-
-    Lanes are pixels in row order from the top left; samples fill the pixel's box evenly.
-    """
-
-    position: NDArray[np.float64]
-    right: NDArray[np.float64]
-    up: NDArray[np.float64]
-    forward: NDArray[np.float64]
-    width: int
-    height: int
-
-
-@dataclass(frozen=True)
-class SensorPoints:
-    """Illuminance sensors: points and normals (N, 3); `replicas` lanes each, sensor by sensor."""
-
-    points: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    replicas: int
+VERTEX_CANDIDATES = 8
+PATCH_CANDIDATES = 8
+"""Light vertices and sun patches among which one is chosen for a connection, by what it would bring if visible."""
 
 
 @dataclass(frozen=True)
@@ -61,68 +48,120 @@ class PathOptions:
     """log2_samples: samples of a lane in one batch. max_depth: steps of a path, glass crossings included.
 
     roulette: paths whose throughput is below this are continued at random, from the second vertex on.
+    connect: use light vertices where the scene allows (light that comes through openings alone, seen from indoors).
     """
 
     log2_samples: int
     max_depth: int
-    roulette: float = 0.5
+    roulette: float = 0.35
+    connect: bool = True
 
 
-def trace_batch(scene: TransportScene, start: CameraRays | SensorPoints, options: PathOptions, seed: int) -> Any:
-    """One batch: mean radiance of each pixel (pixels, 3) [cd/m²] or illuminance (sensors, 3) [lx], float64."""
-    integrator = _Integrator(scene, start, options)
-    patches = SunPatches.trace(scene, seed) if scene.sun_portal_probability.any() else None
-    total = integrator.run(patches, seed)
-    values = np.array(total, dtype=np.float64).T / (1 << options.log2_samples)
-    if isinstance(start, SensorPoints):
-        values = values.reshape(len(start.points), start.replicas, 3).mean(axis=1)
-    return values
+@dataclass(frozen=True)
+class Batch:
+    """What all paths of one batch share. seed: UInt32, opaque."""
+
+    seed: Any
+    patches: SunPatches | None
+    vertices: LightVertices | None
 
 
-class _Integrator:
-    def __init__(self, scene: TransportScene, start: CameraRays | SensorPoints, options: PathOptions) -> None:
+@dataclass
+class Vertex:
+    """A diffuse point of a path, by lane. factor: throughput x reflectance / pi. indoors: connections apply."""
+
+    active: Any
+    point: Any
+    outside: Any
+    normal: Any
+    shading: Any
+    factor: Any
+    indoors: Any
+    step: Any
+    sample: Any
+
+
+class PortalIntegrator:
+    """Batches of one picture, or one set of sensors, of one scene."""
+
+    def __init__(self, scene: TransportScene, start: Start, options: PathOptions) -> None:
         self.scene, self.start, self.options = scene, start, options
         self.light = LightAlong(scene)
-        self.is_sensor = isinstance(start, SensorPoints)
+        self.multiplicity = pilot_multiplicity(scene, self.light)
+        self.connection_density = 0.0
+        self.indoors: NDArray[np.bool_] | None = None
+        lights_inside = scene.has_emitters or scene.point_source_count > 0
+        if options.connect and scene.portals and not lights_inside and not isinstance(start, GivenRays):
+            self.indoors = indoors(scene, start)
+            if self.indoors.any():
+                self.connection_density = connection_density(scene, self.light, self._arriving(None))
+
+    def batch(self, seed: int) -> NDArray[np.float64]:
+        """Mean radiance of each pixel (pixels, 3) [cd/m²], or illuminance (sensors, 3) [lx]."""
+        patches = self._patches(seed)
+        vertices = None
+        if self.connection_density > 0.0:
+            vertices = LightVertices.trace(self.scene, self.light, self._arriving(patches), seed)
+        batch = Batch(dr.opaque(mi.UInt32, seed & 0xFFFFFFFF), patches, vertices)
+        paths = _Paths(self.scene, self.light, self.start, self.options, batch)
+        total = paths.run(self.indoors if vertices else None, self.connection_density)
+        values = np.array(total, dtype=np.float64).T / (1 << self.options.log2_samples)
+        return self.start.gathered(values)
+
+    def _patches(self, seed: int) -> SunPatches | None:
+        if self.multiplicity == 0.0:
+            return None
+        return SunPatches.trace(self.scene, self.light, seed, self.multiplicity)
+
+    def _arriving(self, patches: SunPatches | None) -> Any:
+        options = PathOptions(0, self.options.max_depth, self.options.roulette, connect=False)
+
+        def arriving(origins: Any, directions: Any, seed: int) -> Any:
+            batch = Batch(dr.opaque(mi.UInt32, (seed + 0x2545F491) & 0xFFFFFFFF), patches, None)
+            return _Paths(self.scene, self.light, GivenRays(origins, directions), options, batch).run(None, 0.0)
+
+        return arriving
+
+
+class _Paths:
+    """One wavefront: each lane takes its samples one after the other, so that all lanes stay busy."""
+
+    def __init__(
+        self, scene: TransportScene, light: LightAlong, start: Start, options: PathOptions, batch: Batch
+    ) -> None:
+        self.scene, self.light, self.start, self.options, self.batch = scene, light, start, options, batch
         self.sun = mi.Vector3f(*map(float, scene.sun_direction)) if scene.sun_direction is not None else None
         self.sun_illuminance = mi.Color3f(*map(float, scene.sun_illuminance))
         if self.sun is not None:
             dr.make_opaque(self.sun, self.sun_illuminance)
-        self.patches: SunPatches | None = None
-        # Sensors are diffuse vertices of "reflectance" pi: what leaves them is their illuminance.
-        self.first_throughput = float(np.pi) if self.is_sensor else 1.0
-        if isinstance(start, CameraRays):
-            self.camera = [mi.Vector3f(*map(float, v)) for v in (start.position, start.right, start.up, start.forward)]
-            dr.make_opaque(*self.camera)
-        else:
-            self.sensors = [
-                mi.Float(np.ascontiguousarray(a.T[k])) for a in (start.points, start.normals) for k in range(3)
-            ]
 
-    def run(self, patches: SunPatches | None, seed: int) -> Any:
-        """Sum over samples for each lane."""
-        self.patches = patches
-        if isinstance(self.start, CameraRays):
-            lane_count = self.start.width * self.start.height
+    def run(self, begins_indoors: NDArray[np.bool_] | None, connection_density: float) -> Any:
+        """Sum of radiance (or illuminance) over samples for each lane, RGB."""
+        count = self.start.lane_count
+        self.lane = dr.arange(mi.UInt32, count)
+        self.seed = lane_seed(self.lane, self.batch.seed)
+        self.connection_density = dr.opaque(mi.Float, connection_density)
+        if begins_indoors is None:
+            self.begins_indoors = mi.Bool(False)
         else:
-            lane_count = len(self.start.points) * self.start.replicas
-        lane = dr.arange(mi.UInt32, lane_count)
-        batch_seed = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
-        self.lane, self.seed = lane, lane_seed(lane, batch_seed)
-        zero = dr.zeros(mi.Point3f, lane_count)
+            place = self.lane // (count // len(begins_indoors))
+            self.begins_indoors = dr.gather(mi.Float, floats(begins_indoors), place) > 0.5
+            dr.eval(self.begins_indoors)
+        zero = dr.zeros(mi.Point3f, count)
         state = (
-            dr.full(mi.Bool, True, lane_count),
-            dr.zeros(mi.UInt32, lane_count),
-            dr.zeros(mi.UInt32, lane_count),
+            dr.full(mi.Bool, True, count),
+            dr.zeros(mi.UInt32, count),
+            dr.zeros(mi.UInt32, count),
             mi.Point3f(zero),
             mi.Vector3f(zero),
-            dr.full(mi.Color3f, 1.0, lane_count),
-            dr.full(mi.Float, 1.0, lane_count),
-            dr.zeros(mi.Float, lane_count),
+            dr.full(mi.Color3f, 1.0, count),
+            dr.full(mi.Float, 1.0, count),
+            dr.zeros(mi.Float, count),
+            dr.full(mi.Bool, True, count) & self.begins_indoors,
             mi.Point3f(zero),
             mi.Normal3f(zero),
-            dr.zeros(mi.Float, lane_count),
-            dr.zeros(mi.Color3f, lane_count),
+            dr.zeros(mi.Float, count),
+            dr.zeros(mi.Color3f, count),
         )
         state = dr.while_loop(state, lambda active, *_: active, self._step, label="paths")
         total = state[-1]
@@ -131,15 +170,6 @@ class _Integrator:
 
     def _numbers(self, step: Any, pair_index: int, sample: Any) -> tuple[Any, Any]:
         return pair(self.seed, step * DIMENSION_PAIRS + pair_index, sample, self.options.log2_samples)
-
-    def _camera_ray(self, sample: Any) -> tuple[Any, Any]:
-        assert isinstance(self.start, CameraRays)
-        position, right, up, forward = self.camera
-        jitter_x, jitter_y = pair(self.seed, mi.UInt32(0x7FFF), sample, self.options.log2_samples)
-        column, row = self.lane % self.start.width, self.lane // self.start.width
-        x = (mi.Float(column) + jitter_x) * (2.0 / self.start.width) - 1.0
-        y = 1.0 - (mi.Float(row) + jitter_y) * (2.0 / self.start.height)
-        return mi.Point3f(position), dr.normalize(forward + x * right + y * up)
 
     def _step(
         self,
@@ -151,6 +181,7 @@ class _Integrator:
         throughput: Any,
         ray_density: Any,
         portal_density: Any,
+        inside: Any,
         last: Any,
         last_normal: Any,
         last_weight: Any,
@@ -159,97 +190,87 @@ class _Integrator:
         """One ray of a path, and everything at the vertex that it meets.
 
         ray_density, portal_density: solid-angle densities with which the last vertex's cosine sampling and opening
-        sampling would have taken this ray. last_weight: sum of the openings' weights there (0: none or camera).
+        sampling would have taken this ray. inside: the path has been indoors so far, so that connections apply.
+        last_weight: sum of the openings' weights at the last vertex (0: none or camera).
         """
         scene, light = self.scene, self.light
         first = step == 0
         after_vertex = dr.dot(last_normal, last_normal) > 0.5
-        if not self.is_sensor:
-            camera_origin, camera_direction = self._camera_ray(sample)
-            origin = dr.select(first, camera_origin, origin)
-            direction = dr.select(first, camera_direction, direction)
-            at_sensor = mi.Bool(False)
-        else:
-            at_sensor = first
-        ray_active = active & ~at_sensor
+        sensors = self.start if isinstance(self.start, SensorPoints) else None
+        if sensors is None:
+            jitter = pair(self.seed, mi.UInt32(0x7FFF), sample, self.options.log2_samples)
+            first_origin, first_direction = self.start.ray(self.lane, *jitter)
+            origin = dr.select(first, first_origin, origin)
+            direction = dr.select(first, first_direction, direction)
+        ray_active = active if sensors is None else active & ~first
         found = scene.all.ray_intersect_preliminary(mi.Ray3f(origin, direction), active=ray_active)
         hit = ray_active & found.is_valid()
 
-        # Sky or ground
         escaped = ray_active & ~hit
         share = ray_density / (ray_density + portal_density)
         total = total + dr.select(escaped, throughput * light.beyond(direction, escaped) * share, 0.0)
 
-        # The surface
-        triangle = found.prim_index
-        corner = gather4(scene.triangles, triangle * 3, hit)
-        edge_1 = gather4(scene.triangles, triangle * 3 + 1, hit)
-        edge_2 = gather4(scene.triangles, triangle * 3 + 2, hit)
-        e1, e2 = edge_1.xyz, edge_2.xyz
-        u, v = found.prim_uv.x, found.prim_uv.y
-        point = mi.Point3f(corner.xyz + u * e1 + v * e2)
-        face_normal = dr.normalize(dr.cross(e1, e2))
-        material = mi.UInt32(corner.w)
-        body = gather4(scene.materials, material * 2, hit)
-        extra = gather4(scene.materials, material * 2 + 1, hit)
-        reflectance, emitted = mi.Color3f(body.xyz), mi.Color3f(extra.xyz)
-        is_glass = hit & (body.w >= 0.0)
-        along = dr.dot(face_normal, direction)
-        normal = facing(face_normal, direction)
-        shading = self._shading_normal(triangle, u, v, edge_1.w > 0.5, normal, hit)
+        surface = surface_at(scene, found, direction, hit)
+        point, normal, shading, reflectance = surface.point, surface.normal, surface.shading, surface.reflectance
+        is_glass = hit & (surface.opening >= 0.0)
 
         # Glass: through, or a diffuse reflection at the room side
         choice, roulette = self._numbers(step, 0, sample)
-        passed = light.transmittance(mi.UInt32(dr.maximum(body.w, 0.0)), dr.abs(along), is_glass)
-        room = dr.select(along > 0.0, extra.w, 0.0)
+        passed = light.transmittance(mi.UInt32(dr.maximum(surface.opening, 0.0)), dr.abs(surface.along), is_glass)
+        room = dr.select(surface.along > 0.0, surface.room, 0.0)
         through_probability = dr.select(room > 0.0, passed / (passed + room), 1.0)
         through = is_glass & (choice < through_probability)
         reflected = is_glass & ~through
-        crossing = light.portal_density(
-            found.prim_index, point, direction, last, last_normal, last_weight, through & after_vertex
-        )
-        portal_density = portal_density + dr.select(through & after_vertex, crossing, 0.0)
+        sampled = through & after_vertex
+        crossing = light.portal_density(found.prim_index, point, direction, last, last_normal, last_weight, sampled)
+        portal_density = portal_density + dr.select(sampled, crossing, 0.0)
         throughput = dr.select(through, throughput * passed / through_probability, throughput)
         throughput = dr.select(reflected, throughput / (1.0 - through_probability), throughput)
         ray_density = dr.select(through, ray_density * through_probability, ray_density)
         reflectance = dr.select(reflected, mi.Color3f(room), reflectance)
+        inside &= ~through
 
         vertex = hit & ~through
-        total = total + dr.select(vertex & ~is_glass, throughput * emitted, 0.0)
-        if self.is_sensor:
-            index = self.lane // self.start.replicas  # type: ignore[union-attr]
-            sensor = [dr.gather(mi.Float, values, index, at_sensor) for values in self.sensors]
-            point = dr.select(at_sensor, mi.Point3f(*sensor[:3]), point)
-            normal = dr.select(at_sensor, mi.Normal3f(*sensor[3:]), normal)
-            shading = dr.select(at_sensor, normal, shading)
-            reflectance = dr.select(at_sensor, mi.Color3f(np.pi), reflectance)
-            vertex = vertex | at_sensor
-        outside = offset(point, normal)
+        if scene.has_emitters:
+            total = total + dr.select(vertex & ~is_glass, throughput * surface.emitted, 0.0)
+        if sensors is not None:
+            sensor_point, sensor_normal = sensors.places(self.lane, active & first)
+            point, normal = dr.select(first, sensor_point, point), dr.select(first, sensor_normal, normal)
+            shading = dr.select(first, normal, shading)
+            # A sensor is a diffuse vertex of "reflectance" pi: what leaves it is its illuminance.
+            reflectance = dr.select(first, mi.Color3f(np.pi), reflectance)
+            vertex |= active & first
         factor = throughput * reflectance * INVERSE_PI
+        here = Vertex(vertex, point, offset(point, normal), normal, shading, factor, inside, step, sample)
+        # Area density with which the last vertex's ray finds this one
+        arrival = ray_density * dr.abs(dr.dot(normal, direction)) / dr.maximum(dr.squared_norm(point - last), 1e-12)
         if self.sun is not None:
-            total = total + self._sun_here(
-                vertex, factor, point, outside, normal, shading, direction, ray_density, last, after_vertex & ~is_glass
-            )
+            total = total + self._sun_here(here, arrival, after_vertex & ~is_glass)
+        if self.batch.vertices is not None:
+            kept = dr.select(vertex & inside & after_vertex, arrival / (arrival + self.connection_density), 1.0)
+            throughput = throughput * kept
+            here.factor = factor * kept
+            total = total + self._light_vertex(here)
         weight = mi.Float(0.0)
         if scene.portals:
-            found_light, weight = self._sky_by_portal(vertex, factor, point, outside, normal, shading, step, sample)
+            found_light, weight = self._sky_by_portal(here)
             total = total + found_light
-        if self.patches is not None:
-            total = total + self._sun_patch(vertex, factor, point, outside, normal, shading, step, sample)
+        if self.batch.patches is not None:
+            total = total + self._sun_patch(here)
         if scene.point_source_count:
-            total = total + self._point_source(vertex, factor, outside, normal, shading, step, sample)
+            total = total + self._point_source(here)
 
         # The next ray
         next_1, next_2 = self._numbers(step, 4, sample)
         local = mi.warp.square_to_cosine_hemisphere(mi.Point2f(next_1, next_2))
         onward = mi.Frame3f(shading).to_world(local)
         next_throughput = throughput * reflectance
-        strength = dr.max(next_throughput) * (1.0 / self.first_throughput)
+        strength = dr.max(next_throughput) * (1.0 / self.start.first_throughput)
         survival = dr.select(first, 1.0, dr.minimum(1.0, strength * (1.0 / self.options.roulette)))
         survives = (dr.dot(normal, onward) > 0.0) & (local.z > 0.0) & (roulette < survival)
         next_throughput = next_throughput / dr.maximum(survival, 1e-12)
 
-        origin = dr.select(through, offset(point, face_normal * dr.sign(along)), outside)
+        origin = dr.select(through, offset(point, surface.face_normal * dr.sign(surface.along)), here.outside)
         direction = dr.select(vertex, onward, direction)
         throughput = dr.select(vertex, next_throughput, throughput)
         ray_density = dr.select(vertex, local.z * INVERSE_PI, ray_density)
@@ -261,108 +282,110 @@ class _Integrator:
         step = step + 1
         going = ((vertex & survives) | through) & (step < self.options.max_depth) & (dr.max(throughput) > 0.0)
         sample = dr.select(going, sample, sample + 1)
-        step = dr.select(going, step, 0)
-        throughput = dr.select(going, throughput, 1.0)
-        ray_density = dr.select(going, ray_density, 1.0)
-        portal_density = dr.select(going, portal_density, 0.0)
-        last_normal = dr.select(going, last_normal, mi.Normal3f(0.0))
-        last_weight = dr.select(going, last_weight, 0.0)
         active = active & (sample < (1 << self.options.log2_samples))
         return (
             active,
             sample,
-            step,
+            dr.select(going, step, 0),
             mi.Point3f(origin),
             mi.Vector3f(direction),
-            throughput,
-            ray_density,
-            portal_density,
+            dr.select(going, throughput, 1.0),
+            dr.select(going, ray_density, 1.0),
+            dr.select(going, portal_density, 0.0),
+            dr.select(going, inside, self.begins_indoors),
             mi.Point3f(last),
-            mi.Normal3f(last_normal),
-            last_weight,
+            mi.Normal3f(dr.select(going, last_normal, mi.Normal3f(0.0))),
+            dr.select(going, last_weight, 0.0),
             total,
         )
 
-    def _shading_normal(self, triangle: Any, u: Any, v: Any, smooth: Any, normal: Any, active: Any) -> Any:
-        if self.scene.normals is None:
-            return normal
-        smooth = smooth & active
-        a, b, c = (dr.gather(mi.Normal3f, self.scene.normals, triangle * 3 + k, smooth) for k in range(3))
-        blended = dr.normalize((1.0 - u - v) * a + u * b + v * c)
-        turned = dr.select(dr.dot(blended, normal) < 0.0, -blended, blended)
-        return dr.select(smooth, turned, normal)
-
-    def _sun_here(
-        self,
-        vertex: Any,
-        factor: Any,
-        point: Any,
-        outside: Any,
-        normal: Any,
-        shading: Any,
-        direction: Any,
-        ray_density: Any,
-        last: Any,
-        may_be_connected: Any,
-    ) -> Any:
-        cosine, true_cosine = dr.dot(shading, self.sun), dr.dot(normal, self.sun)
-        lit = vertex & (cosine > 0.0) & (true_cosine > 0.0)
-        passed, density = self.light.sun(outside, self.sun, lit)
+    def _sun_here(self, here: Vertex, arrival: Any, may_be_connected: Any) -> Any:
+        """Direct sun; with the ray's share by the balance heuristic where a connection could have brought it."""
+        cosine, true_cosine = dr.dot(here.shading, self.sun), dr.dot(here.normal, self.sun)
+        lit = here.active & (cosine > 0.0) & (true_cosine > 0.0)
+        passed, density = self.light.sun(here.outside, self.sun, lit)
         share = mi.Float(1.0)
-        if self.patches is not None:
-            connection = self.patches.multiplicity * density * true_cosine
-            squared = dr.squared_norm(point - last)
-            arrival = ray_density * dr.abs(dr.dot(normal, direction)) / dr.maximum(squared, 1e-12)
+        if self.batch.patches is not None:
+            connection = self.batch.patches.multiplicity * density * true_cosine
             share = dr.select(may_be_connected & (density > 0.0), arrival / (arrival + connection), 1.0)
-        return dr.select(lit & (passed > 0.0), factor * self.sun_illuminance * (passed * cosine * share), 0.0)
+        return dr.select(lit & (passed > 0.0), here.factor * self.sun_illuminance * (passed * cosine * share), 0.0)
 
-    def _sky_by_portal(
-        self, vertex: Any, factor: Any, point: Any, outside: Any, normal: Any, shading: Any, step: Any, sample: Any
-    ) -> tuple[Any, Any]:
-        choice, _ = self._numbers(step, 1, sample)
-        u, v = self._numbers(step, 2, sample)
-        target, weight = self.light.portal_point(choice, u, v, point, shading, vertex)
-        towards = dr.normalize(target - outside)
-        cosine = dr.dot(shading, towards)
-        seen = vertex & (weight > 0.0) & (cosine > 0.0) & (dr.dot(normal, towards) > 0.0)
-        passed, through_probability, portal_density = self.light.outward(outside, towards, point, shading, weight, seen)
+    def _sky_by_portal(self, here: Vertex) -> tuple[Any, Any]:
+        """Sky and ground through a sampled point of an opening, and the sum of the openings' weights."""
+        choice, _ = self._numbers(here.step, 1, here.sample)
+        u, v = self._numbers(here.step, 2, here.sample)
+        target, weight = self.light.portal_point(choice, u, v, here.point, here.shading, here.active)
+        towards, _, cosine, seen = _towards(here, target)
+        seen &= weight > 0.0
+        passed, through_probability, portal_density = self.light.outward(
+            here.outside, towards, here.point, here.shading, weight, seen
+        )
         ray_density = cosine * INVERSE_PI * through_probability
         seen = seen & (passed > 0.0) & (portal_density > 0.0)
         arriving = self.light.beyond(towards, seen) * (passed * cosine / (portal_density + ray_density))
-        return dr.select(seen, factor * arriving, 0.0), weight
+        return dr.select(seen, here.factor * arriving, 0.0), weight
 
-    def _sun_patch(
-        self, vertex: Any, factor: Any, point: Any, outside: Any, normal: Any, shading: Any, step: Any, sample: Any
-    ) -> Any:
-        assert self.patches is not None
-        choice, _ = self._numbers(step, 3, sample)
-        place, patch_normal, radiance, density = self.patches.choose(choice, vertex)
-        gap = mi.Vector3f(place - outside)
-        squared = dr.squared_norm(gap)
-        distance = dr.sqrt(squared)
-        towards = gap / distance
-        cosine, patch_cosine = dr.dot(shading, towards), -dr.dot(patch_normal, towards)
-        seen = vertex & (cosine > 0.0) & (dr.dot(normal, towards) > 0.0) & (patch_cosine > 0.0) & (squared > 1e-8)
-        passed, through_probability = self.light.between(outside, towards, distance, seen)
-        ray_density = cosine * INVERSE_PI * through_probability * patch_cosine / squared
-        connection = self.patches.multiplicity * density
-        flow = passed * cosine * patch_cosine / squared
-        share = self.patches.multiplicity * self.patches.valid_share / (connection + ray_density)
-        return dr.select(seen & (passed > 0.0), factor * radiance * (flow * share), 0.0)
+    def _sun_patch(self, here: Vertex) -> Any:
+        """A point lit by the sun through an opening, connected to the vertex."""
+        patches = self.batch.patches
+        assert patches is not None
+        choice, number = self._numbers(here.step, 3, here.sample)
 
-    def _point_source(
-        self, vertex: Any, factor: Any, outside: Any, normal: Any, shading: Any, step: Any, sample: Any
-    ) -> Any:
+        def candidate(part: int) -> tuple[Any, tuple[Any, ...]]:
+            place, normal, radiance, density = patches.choose((choice + part) * (1.0 / PATCH_CANDIDATES), here.active)
+            towards, squared, cosine, seen = _towards(here, place)
+            other_cosine = -dr.dot(normal, towards)
+            seen &= (other_cosine > 0.0) & (squared > 1e-8)
+            flow = cosine * other_cosine / squared
+            connection = patches.multiplicity * density
+            value = dr.max(radiance) * flow / (connection + flow * INVERSE_PI)
+            return dr.select(seen, value, 0.0), (towards, squared, flow, radiance, connection)
+
+        total, chosen, (towards, squared, flow, radiance, connection) = resample(candidate, PATCH_CANDIDATES, number)
+        seen = here.active & (chosen > 0.0)
+        passed, through_probability = self.light.between(here.outside, towards, dr.sqrt(squared), seen)
+        value = passed * flow / (connection + flow * INVERSE_PI * through_probability)
+        strength = value * patches.multiplicity * patches.valid_share * total / chosen
+        return dr.select(seen & (passed > 0.0), here.factor * radiance * strength, 0.0)
+
+    def _light_vertex(self, here: Vertex) -> Any:
+        """Light reflected indoors, except the sun's first reflection, by a light vertex with the connection's share."""
+        vertices = self.batch.vertices
+        assert vertices is not None
+        choice, number = self._numbers(here.step, 5, here.sample)
+        may = here.active & here.indoors
+
+        def candidate(part: int) -> tuple[Any, tuple[Any, ...]]:
+            place, normal, power = vertices.choose((choice + part) * (1.0 / VERTEX_CANDIDATES), may)
+            towards, squared, cosine, seen = _towards(here, place)
+            other_cosine = -dr.dot(normal, towards)
+            seen &= may & (other_cosine > 0.0) & (squared > 1e-8)
+            flow = cosine * other_cosine / squared
+            value = flow * self.connection_density / (self.connection_density + flow * INVERSE_PI)
+            return dr.select(seen, dr.max(power) * value, 0.0), (towards, squared, power)
+
+        total, chosen, (towards, squared, power) = resample(candidate, VERTEX_CANDIDATES, number)
+        ray = mi.Ray3f(here.outside, towards)
+        ray.maxt = dr.sqrt(squared) * (1.0 - 1e-5)
+        seen = may & (chosen > 0.0)
+        seen &= ~self.scene.all.ray_test(ray, active=seen)
+        return dr.select(seen, here.factor * (power / dr.max(power)) * total, 0.0)
+
+    def _point_source(self, here: Vertex) -> Any:
+        """One point source, chosen evenly."""
         count = self.scene.point_source_count
-        _, choice = self._numbers(step, 1, sample)
+        _, choice = self._numbers(here.step, 1, here.sample)
         index = dr.minimum(mi.UInt32(choice * count), count - 1) * 6
-        place = mi.Point3f(*(dr.gather(mi.Float, self.scene.point_sources, index + k, vertex) for k in range(3)))
-        power = mi.Color3f(*(dr.gather(mi.Float, self.scene.point_sources, index + k, vertex) for k in range(3, 6)))
-        gap = mi.Vector3f(place - outside)
-        squared = dr.squared_norm(gap)
-        distance = dr.sqrt(squared)
-        towards = gap / distance
-        cosine = dr.dot(shading, towards)
-        seen = vertex & (cosine > 0.0) & (dr.dot(normal, towards) > 0.0)
-        passed, _ = self.light.between(outside, towards, distance, seen)
-        return dr.select(seen, factor * power * (passed * cosine * count / squared), 0.0)
+        x, y, z, *power = (dr.gather(mi.Float, self.scene.point_sources, index + k, here.active) for k in range(6))
+        towards, squared, cosine, seen = _towards(here, mi.Point3f(x, y, z))
+        passed, _ = self.light.between(here.outside, towards, dr.sqrt(squared), seen)
+        return dr.select(seen, here.factor * mi.Color3f(*power) * (passed * cosine * count / squared), 0.0)
+
+
+def _towards(here: Vertex, place: Any) -> tuple[Any, Any, Any, Any]:
+    """Direction to a place, squared distance, cosine by the shading normal, and the lanes that the place may light."""
+    gap = mi.Vector3f(place - here.outside)
+    squared = dr.squared_norm(gap)
+    towards = gap * dr.rsqrt(squared)
+    cosine = dr.dot(here.shading, towards)
+    return towards, squared, cosine, here.active & (cosine > 0.0) & (dr.dot(here.normal, towards) > 0.0)

@@ -1,4 +1,4 @@
-"""The scene as the portal integrator reads it: ray-tracing scenes and flat tables of triangles, materials and openings."""
+"""The scene as the portal integrator reads it: ray-tracing scenes, and tables of triangles, materials and openings."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from transom.colour import luminance
 from transom.daylight.condition import Condition
 from transom.glass import diffuse_reflectance, transmittance_table
 from transom.scene.model import Mesh, Scene
-from transom_reference.mitsuba_setup import dr, mi
+from transom_reference.mitsuba_setup import dr, floats, mi
 
 Float64 = NDArray[np.float64]
 Int32 = NDArray[np.int32]
@@ -60,8 +60,9 @@ class Portal:
 class TransportScene:
     """Everything that the integrator gathers from. `opaque` and `glass` are None when the scene has no such faces.
 
-    all, opaque, glass: mi.Scene. triangles: flat (T, 12): v0, material; e1, smooth (0 or 1); e2, 0. normals: flat (T, 12),
-    corner normals, or None. materials: flat (M, 8): reflectance rgb, opening (or -1); luminance rgb, room reflectance.
+    all, opaque, glass: mi.Scene. triangles: flat (T, 12): v0, material; e1, smooth (0 or 1); e2, 0.
+    normals: flat (T, 9), corner normals, or None. materials: flat (M, 8): reflectance rgb, opening
+    (or -1); luminance rgb, room reflectance.
     glass_table: flat (openings, 1025). room_reflectance: (openings,). portal_of_glass_triangle: UInt32; the glass
     triangles are the last rows of `triangles`, after `opaque_count` others.
     portal_table: flat (P, 16): corner, area; edge_u, is_triangle; edge_v, weight; normal, opening.
@@ -85,6 +86,7 @@ class TransportScene:
     sky_rgb: Any
     sun_direction: Float64 | None
     sun_illuminance: Float64
+    sun_portal_flux: Float64
     sun_portal_probability: Float64
     point_sources: Any
     point_source_count: int
@@ -130,10 +132,6 @@ def _ray_scene(vertices: Float64, triangles: Int32) -> Any:
     parameters["faces"] = mi.UInt32(triangles.astype(np.uint32).ravel())
     parameters.update()
     return mi.load_dict({"type": "scene", "mesh": mesh})
-
-
-def _flat(rows: NDArray[Any]) -> Any:
-    return mi.Float(np.ascontiguousarray(rows, dtype=np.float32).ravel())
 
 
 def sky_table(condition: Condition) -> NDArray[np.float32]:
@@ -212,28 +210,30 @@ def build_transport_scene(scene: Scene, condition: Condition) -> TransportScene:
     sun = condition.sun_direction
     illuminance = np.asarray(condition.sun_illuminance_rgb, dtype=np.float64)
     has_sun = sun is not None and bool((illuminance > 0).any())
+    sun_flux = _sun_flux(sun, portals, glass) if has_sun else np.zeros(len(portals))
     sources = np.array([[*s.position, *s.intensity] for s in scene.point_sources]).reshape(-1, 6)
     result = TransportScene(
         all=_ray_scene(mesh.vertices, rows[order]),
         opaque=_ray_scene(mesh.vertices, rows[~is_glass]),
         glass=_ray_scene(mesh.vertices, rows[is_glass]),
-        triangles=_flat(triangle_table[order]),
-        normals=_flat(_triangle_normals(mesh)[order].reshape(-1, 9)) if smooth.any() else None,
-        materials=_flat(material_table),
-        glass_table=_flat(glass),
-        room_reflectance=mi.Float(np.array(room, dtype=np.float32)) if room else mi.Float(0.0),
+        triangles=floats(triangle_table[order]),
+        normals=floats(_triangle_normals(mesh)[order].reshape(-1, 9)) if smooth.any() else None,
+        materials=floats(material_table),
+        glass_table=floats(glass),
+        room_reflectance=floats(np.array(room)) if room else mi.Float(0.0),
         opaque_count=int((~is_glass).sum()),
         portal_of_glass_triangle=mi.UInt32(portal_of_row[is_glass]),
-        portal_table=_flat(portal_table),
+        portal_table=floats(portal_table),
         portals=portals,
         portal_weights=weights,
-        sky_table=_flat(table),
+        sky_table=floats(table),
         ground=mi.Color3f(*(float(v) for v in condition.ground_luminance_rgb)),
         sky_rgb=mi.Color3f(*(float(v) for v in condition.sky_rgb)),
         sun_direction=np.asarray(sun, dtype=np.float64) if has_sun else None,
         sun_illuminance=illuminance,
-        sun_portal_probability=_sun_portals(sun, portals, glass) if has_sun else np.zeros(len(portals)),
-        point_sources=_flat(sources),
+        sun_portal_flux=sun_flux,
+        sun_portal_probability=sun_flux / sun_flux.sum() if sun_flux.any() else sun_flux,
+        point_sources=floats(sources),
         point_source_count=len(sources),
         has_emitters=any(max(entry.luminance) > 0 for entry in scene.materials),
     )
@@ -251,12 +251,11 @@ def _triangle_normals(mesh: Mesh) -> Float64:
     return normals
 
 
-def _sun_portals(sun: Any, portals: tuple[Portal, ...], glass: NDArray[Any]) -> Float64:
-    """Probability of each portal in proportion to the sun's flux through it; zeros when none faces the sun."""
+def _sun_flux(sun: Any, portals: tuple[Portal, ...], glass: NDArray[Any]) -> Float64:
+    """Flux through each portal for a sun of 1 lx that nothing outdoors hides [lm]; 0 where it does not face the sun."""
     flux = np.zeros(len(portals))
     for index, portal in enumerate(portals):
         cosine = max(0.0, float(np.dot(portal.normal, sun)))
         passed = float(np.interp(cosine * TABLE_INTERVALS, np.arange(TABLE_INTERVALS + 1), glass[portal.opening]))
         flux[index] = cosine * portal.area * passed
-    total = flux.sum()
-    return flux / total if total > 0 else flux
+    return flux

@@ -59,7 +59,7 @@ class PlainCondition:
 
 
 def box_quads(size: tuple[float, float, float]) -> dict[str, Float64]:
-    """The six faces of the box from (0, 0, 0) to `size`, corners counter-clockwise from inside (fronts look inwards)."""
+    """The six faces of the box from (0, 0, 0) to `size`, corners counter-clockwise seen from inside."""
     x, y, z = size
     return {
         "floor": np.array([[0, 0, 0], [x, 0, 0], [x, y, 0], [0, y, 0]], dtype=float),
