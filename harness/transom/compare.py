@@ -10,8 +10,8 @@ variance where noise dominates, and then the extrapolation removes too little of
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,13 +27,10 @@ Float64 = NDArray[np.float64]
 BLOCK_PIXELS = 4
 """Side of the blocks whose mean luminances are compared."""
 
+LEAST_GROUPS = 8
+"""Fewer groups of batches say too little about a standard error."""
+
 SHARE_LIMITS_PERCENT = (2.0, 5.0, 10.0)
-
-INTERIOR = "interior"
-"""Name of the region of all pixels that see a surface of the interior."""
-
-EXTERIOR = "exterior"
-"""Name of the region of all other pixels: sky and ground seen directly."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +105,8 @@ class SensorComparison:
 
 @dataclass(frozen=True)
 class CaseNames:
-    """What a comparison is of."""
+    """What a comparison is of. reference_means: by region, the reference's mean luminance [cd/m²] in each of several
+    groups of batches, from which the uncertainty of its mean is known whatever its pixels have in common."""
 
     scene: str
     condition: str
@@ -118,6 +116,7 @@ class CaseNames:
     engine_key: str = ""
     reference_key: str = ""
     reference_batch_count: int = 0
+    reference_means: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
 
 def cross_half_mse(engine: Float64, half_1: Float64, half_2: Float64) -> float:
@@ -172,11 +171,12 @@ def compare_region(
     without_noise = 2 * error - half_error
     pixel_error = np.zeros(len(theirs)) if reference.standard_error is None else reference.standard_error[mask]
     mean, count = float(theirs.mean()), len(theirs)
-    # Pixels are independent in the references; the halves would show it if they were not.
-    mean_error = max(float(np.sqrt(np.sum(pixel_error**2.0))) / count, abs(float(np.mean(halves[0] - halves[1]))) / 2)
+    mean_error = _mean_standard_error(names.reference_means.get(region, ()), pixel_error, halves)
     relative_noise = _ratio(pixel_error, theirs + floor)
     # What the noise does to the mean of `without_noise`: to its first term, and to the extrapolation added to it.
+    # What pixels have in common is in the mean's own uncertainty.
     spread = np.hypot(np.sqrt(np.mean(relative_noise**2)), np.std(error - half_error)) / np.sqrt(count)
+    spread = np.hypot(spread, mean_error / mean if mean > 0 else 0.0)
     mse = cross_half_mse(ours, *halves)
     blocks = block_errors(ours_image, theirs_image, mask, floor)
     quantiles = np.percentile(blocks if blocks.size else error, [50, 95, 99])
@@ -223,14 +223,12 @@ def compare_region(
 def compare_images(
     engine: ImageResult,
     reference: ImageResult,
-    interior: Bool,
-    regions: Mapping[str, Bool],
+    masks: Mapping[str, Bool],
     names: CaseNames,
     coarse: ImageResult | None = None,
 ) -> list[ImageComparison]:
-    """The interior, each named region that the view sees, and the exterior apart."""
-    masks = {INTERIOR: interior, **regions, EXTERIOR: ~interior}
-    return [compare_region(engine, reference, mask, name, names, coarse) for name, mask in masks.items() if mask.any()]
+    """Region by region; masks by name, as of `transom.visible.region_masks`."""
+    return [compare_region(engine, reference, mask, name, names, coarse) for name, mask in masks.items()]
 
 
 def compare_sensors(
@@ -271,6 +269,17 @@ def compare_sensors(
             )
         )
     return rows
+
+
+def _mean_standard_error(
+    group_means: Sequence[float], pixel_error: NDArray[np.floating], halves: tuple[Float64, Float64]
+) -> float:
+    """Standard error of the reference's mean luminance [cd/m²]: from its spread over groups of batches; without them
+    the larger of what independent pixels would give and half the difference of the halves."""
+    if len(group_means) >= LEAST_GROUPS:
+        return float(np.std(group_means, ddof=1) / np.sqrt(len(group_means)))
+    independent = float(np.sqrt(np.sum(pixel_error**2.0))) / len(pixel_error)
+    return max(independent, abs(float(np.mean(halves[0] - halves[1]))) / 2)
 
 
 def _half_luminances(reference: ImageResult, mask: Bool, mean: Float64) -> tuple[Float64, Float64]:

@@ -19,10 +19,13 @@ from transom.renderer import ImageResult, Progress, Renderer, SensorResult
 from transom.scene.model import Scene, View
 from transom.sensor_file import SensorTable, scene_sensors
 from transom.suite import Suite
-from transom.visible import first_surfaces
+from transom.visible import first_surfaces, region_masks
 
 SENSOR_TARGET_PERCENT = 0.2
 """Standard error of a published illuminance, relative to it (median over a scene's sensors)."""
+
+MEAN_GROUPS = 64
+"""Groups of batches whose means are kept, for the uncertainty of a reference's mean."""
 
 LEAST_BATCHES = 32
 """Published references have at least so many batches, so that Student's quantile stays near the normal one."""
@@ -166,6 +169,8 @@ def _render_in_batches(
     facts = {**facts, "relative_standard_error_percent": round(percent, 5), "batches": count}
     if resumed:
         facts["batches_resumed"] = resumed
+    if case.view is not None:
+        facts["group_means_cd_m2"] = _group_means(batches, count, case.scene, case.view)
     case = replace(case, options={**case.options, "batches": count})
     seconds = time.perf_counter() - started
     bundle = store.write(case, image=image, sensors=table, facts=facts, wall_seconds=seconds)
@@ -197,6 +202,22 @@ def _measure(
     result: SensorResult = measure(case.scene, case.condition, points, normals, options, progress, **extra)
     table = case.sensors.measured(np.asarray(luminance(result.illuminance), np.float64), result.standard_error)
     return table, dict(result.facts)
+
+
+def _group_means(batches: BatchStore, count: int, scene: Scene, view: View) -> dict[str, list[float]]:
+    """By region, the mean luminance [cd/m²] of each of MEAN_GROUPS groups of batches (arrays `values`, (h, w, 3)).
+
+    Batches are independent whatever their pixels have in common, so that the spread of these means is the noise's.
+    """
+    masks = region_masks(scene, view)
+    groups = np.arange(count) % min(count, MEAN_GROUPS)
+    sums = {region: np.zeros(groups.max() + 1) for region in masks}
+    for index, group in enumerate(groups):
+        values = luminance(batches.load(index)["values"])
+        for region, mask in masks.items():
+            sums[region][group] += values[mask].mean()
+    sizes = np.bincount(groups)
+    return {region: [float(f"{value:.7g}") for value in total / sizes] for region, total in sums.items()}
 
 
 def _image_percent(image: ImageResult, scene: Scene, view: View) -> float:

@@ -10,6 +10,12 @@ from numpy.typing import NDArray
 from transom.scene import region_mask
 from transom.scene.model import Region, Scene, View
 
+INTERIOR = "interior"
+"""Name of the region of all pixels that see a surface of the interior."""
+
+EXTERIOR = "exterior"
+"""Name of the region of all other pixels: sky and ground seen directly."""
+
 
 @dataclass(frozen=True)
 class FirstSurfaces:
@@ -30,6 +36,16 @@ def first_surfaces(scene: Scene, view: View) -> FirstSurfaces:
 
     face, position, interior = trace_primary(scene, view)
     return FirstSurfaces(face, position, interior)
+
+
+def region_masks(scene: Scene, view: View, surfaces: FirstSurfaces | None = None) -> dict[str, NDArray[np.bool_]]:
+    """The regions that a view is compared on and that it sees, as masks (h, w): the interior, the scene's own regions
+    within it, and the exterior apart."""
+    surfaces = surfaces or first_surfaces(scene, view)
+    masks = {INTERIOR: surfaces.interior}
+    masks |= {region.name: region_pixels(scene, region, surfaces) for region in scene.regions}
+    masks[EXTERIOR] = ~surfaces.interior
+    return {name: mask for name, mask in masks.items() if mask.any()}
 
 
 def region_pixels(scene: Scene, region: Region, surfaces: FirstSurfaces) -> NDArray[np.bool_]:

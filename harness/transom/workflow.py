@@ -33,7 +33,7 @@ from transom.scene import scene_root
 from transom.scene.model import View
 from transom.sensor_file import SensorTable, scene_sensors
 from transom.suite import Suite, SuiteCase, load_suite
-from transom.visible import first_surfaces, region_pixels
+from transom.visible import region_masks
 
 VISIBILITIES = ("volumes", "rays")
 ENGINE = "engine"
@@ -211,14 +211,13 @@ def _compare_view(
             continue
         rendered[visibility] = ours
     if truth is not None and rendered:
-        surfaces = first_surfaces(scene, view)
-        regions = {region.name: region_pixels(scene, region, surfaces) for region in scene.regions}
+        masks = region_masks(scene, view)
         reference = truth.image()
         coarse = _coarse(entry, engine, view=view)
         rough = None if coarse is None else coarse.image()
         for visibility, bundle in rendered.items():
             names = _names(entry, view.name, visibility, bundle, truth)
-            found.images += compare_images(bundle.image(), reference, surfaces.interior, regions, names, rough)
+            found.images += compare_images(bundle.image(), reference, masks, names, rough)
     if len(rendered) == len(VISIBILITIES):
         pair = [rendered[visibility].image() for visibility in VISIBILITIES]
         found.agreements.append(compare_methods(scene.name, view.name, condition.name, pair[0], pair[1]))
@@ -263,6 +262,7 @@ def _names(entry: SuiteCase, view: str, method: str, ours: Bundle, truth: Bundle
         engine_key=ours.record.key,
         reference_key=truth.record.key,
         reference_batch_count=int(truth.record.facts.get("batches", 0)),
+        reference_means=truth.record.facts.get("group_means_cd_m2", {}),
     )
 
 

@@ -110,14 +110,14 @@ class NoisyRenderer:
         options: Mapping[str, Any],
     ) -> NDArray[np.float64]:
         if batches is not None and batches.has(index):
-            return batches.load(index)["values"]
+            return batches.load(index)["values"][..., 0]
         if self.stop_after is not None and len(self.rendered) >= self.stop_after:
             raise KeyboardInterrupt
         noise = np.random.default_rng((options["seed"], index)).standard_normal(shape)
         values = self.level * (1 + self.relative_noise * noise)
         self.rendered.append(index)
         if batches is not None:
-            batches.save(index, {"values": values})
+            batches.save(index, {"values": np.repeat(values[..., None], 3, axis=-1)})
         if progress is not None:
             progress(index + 1, options["batches"])
         return values

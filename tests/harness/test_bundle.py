@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from harness_fakes import NoisyRenderer, grey, small_condition, small_scene
 
-from transom import run
+from transom import run, visible
 from transom.bundle import BatchStore, Store, cache_store, make_case, read_bundle, repository_store
 from transom.colour import luminance
 from transom.errors import InputError
@@ -34,6 +34,7 @@ def everything_is_interior(monkeypatch: pytest.MonkeyPatch) -> None:
         return FirstSurfaces(np.zeros(shape, np.int32), np.zeros((*shape, 3), np.float32), np.ones(shape, bool))
 
     monkeypatch.setattr(run, "first_surfaces", surfaces)
+    monkeypatch.setattr(visible, "first_surfaces", surfaces)
 
 
 def image_case(renderer: NoisyRenderer, scene: Scene | None = None, **options: object):  # type: ignore[no-untyped-def]
@@ -144,8 +145,9 @@ import sys
 sys.path.insert(0, sys.argv[1])
 from harness_fakes import NoisyRenderer, small_condition, small_scene
 from transom.bundle import make_case, repository_store
-from transom import run
+from transom import run, visible
 run._image_percent = lambda *_: 1.0
+run._group_means = lambda *_: {}
 scene = small_scene()
 for seed in range(1_000_000):
     case = make_case(scene, small_condition(), NoisyRenderer(), {"seed": seed, "batches": 6}, view=scene.views[0])
@@ -161,7 +163,7 @@ for seed in range(1_000_000):
             process.kill()
     for path in cache_store().root.rglob("*.npz"):
         if not path.name.startswith("."):
-            assert BatchStore(path.parent).load(int(path.stem))["values"].shape == (8, 12)
+            assert BatchStore(path.parent).load(int(path.stem))["values"].shape == (8, 12, 3)
     bundles = [bundle for folder in repository_store().root.iterdir() if (bundle := read_bundle(folder))]
     assert bundles
     for bundle in bundles:

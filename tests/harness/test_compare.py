@@ -10,8 +10,6 @@ from harness_fakes import grey
 from numpy.typing import NDArray
 
 from transom.compare import (
-    EXTERIOR,
-    INTERIOR,
     CaseNames,
     block_errors,
     compare_images,
@@ -22,6 +20,7 @@ from transom.compare import (
 from transom.noise import mean_relative_standard_error
 from transom.renderer import ImageResult
 from transom.sensor_file import SensorTable
+from transom.visible import EXTERIOR, INTERIOR
 
 NAMES = CaseNames("room", "noon", "rays", "mitsuba", "view")
 SHAPE = (120, 160)
@@ -122,9 +121,8 @@ def test_regions_are_apart_and_exterior_is_not_in_the_interior() -> None:
     desk = interior.copy()
     desk[:100] = False
     engine[100:] *= 1.1
-    rows = compare_images(
-        ImageResult(grey(engine)), ImageResult(grey(truth)), interior, {"desk": desk, "unseen": ~EVERYWHERE}, NAMES
-    )
+    masks = {INTERIOR: interior, "desk": desk, EXTERIOR: ~interior}
+    rows = compare_images(ImageResult(grey(engine)), ImageResult(grey(truth)), masks, NAMES)
     by_name = {row.region: row for row in rows}
     assert set(by_name) == {INTERIOR, "desk", EXTERIOR}
     assert by_name["desk"].bias_percent == pytest.approx(10.0, rel=1e-3)
@@ -185,3 +183,15 @@ def test_numerical_bias_is_the_change_from_half_as_many_patches() -> None:
     assert result.bias_numerical_percent == pytest.approx(2.0, rel=1e-3)
     assert result.mean_relative_error_numerical_percent == pytest.approx(2.0, rel=0.02)
     assert compare_region(ours, ours, EVERYWHERE, "all", NAMES).bias_numerical_percent is None
+
+
+def test_noise_that_pixels_share_is_in_the_uncertainty_of_the_mean() -> None:
+    """A reference whose every batch is too bright or too dark as a whole: its pixels agree, its batches do not."""
+    truth, random = smooth_truth(), np.random.default_rng(2)
+    levels = 1 + 0.05 * random.standard_normal(64)
+    means = dataclasses.replace(NAMES, reference_means={"all": [float(truth.mean() * level) for level in levels]})
+    reference = ImageResult(grey(truth * levels.mean()))
+    result = compare_region(ImageResult(grey(truth)), reference, EVERYWHERE, "all", means)
+    assert result.bias_standard_error_percent == pytest.approx(5.0 / 8, rel=0.25)
+    assert abs(result.bias_percent) < 4 * result.bias_standard_error_percent
+    assert result.mean_relative_error_standard_error_percent >= result.bias_standard_error_percent * 0.99

@@ -116,7 +116,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr("transom.workflow.scene_root", lambda: scenes)
     for module in ("workflow", "report.pictures"):
         monkeypatch.setattr(f"transom.{module}.load_renderer", renderers.__getitem__)
-    for module in ("run", "workflow", "report.pictures"):
+    for module in ("run", "visible", "report.pictures"):
         monkeypatch.setattr(f"transom.{module}.first_surfaces", surfaces)
     timings = [
         Timing("small", "solve", "s", 1.0, 0.9, 1.1, 3, 2, 40),

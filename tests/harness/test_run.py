@@ -47,6 +47,7 @@ def renderer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> NoisyRenderer:
     monkeypatch.setattr("transom.suite.scene_root", lambda: tmp_path)
     monkeypatch.setattr("transom.references.load_renderer", lambda _: fake)
     monkeypatch.setattr("transom.run.first_surfaces", surfaces)
+    monkeypatch.setattr("transom.visible.first_surfaces", surfaces)
     monkeypatch.setattr("transom.run.SENSOR_TARGET_PERCENT", 2.0)
     return fake
 
