@@ -44,6 +44,10 @@ class CameraRays:
         dr.make_opaque(frame)
         return frame
 
+    def prepare(self) -> None:
+        """Moves the numbers to Dr.Jit: to be called before, not within, a symbolic loop."""
+        _ = self._frame
+
     def ray(self, lane: Any, jitter_x: Any, jitter_y: Any) -> tuple[Any, Any]:
         position, right, up, forward = self._frame
         column, row = lane % self.width, lane // self.width
@@ -73,6 +77,10 @@ class SensorPoints:
     def _columns(self) -> list[Any]:
         return [*points(self.points), *points(self.normals)]
 
+    def prepare(self) -> None:
+        """Moves the numbers to Dr.Jit: to be called before, not within, a symbolic loop."""
+        _ = self._columns
+
     def places(self, lane: Any, active: Any) -> tuple[Any, Any]:
         index = lane // self.replicas
         values = [dr.gather(mi.Float, column, index, active) for column in self._columns]
@@ -98,6 +106,10 @@ class GivenRays:
     @property
     def lane_count(self) -> int:
         return int(dr.width(self.directions))
+
+    def prepare(self) -> None:
+        """Evaluates the rays before a symbolic loop reads them."""
+        dr.eval(self.origins, self.directions)
 
     def ray(self, lane: Any, jitter_x: Any, jitter_y: Any) -> tuple[Any, Any]:  # noqa: ARG002
         return dr.gather(mi.Point3f, self.origins, lane), dr.gather(mi.Vector3f, self.directions, lane)

@@ -138,6 +138,7 @@ class _Paths:
     def run(self, begins_indoors: NDArray[np.bool_] | None, connection_density: float) -> Any:
         """Sum of radiance (or illuminance) over samples for each lane, RGB."""
         count = self.start.lane_count
+        self.start.prepare()
         self.lane = dr.arange(mi.UInt32, count)
         self.seed = lane_seed(self.lane, self.batch.seed)
         self.connection_density = dr.opaque(mi.Float, connection_density)
