@@ -115,10 +115,12 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
     const int n = std::max(kMinimumRaysPerTriangle, static_cast<int>(std::lround(importance[k] / total * count)));
     const SobolSequence points(hash_seed(seed, k + 1));
     const glm::vec3 normal = mesh_.faces().faces[t.face].normal;
+    glm::vec3 seen_from = middle.position;
+    SphericalTriangle seen = triangle_from(t, seen_from);
     for (int i = 0; i < n; ++i) {
       const glm::vec4 u = points.point4(static_cast<std::uint32_t>(i));
       const Origin origin = origin_of(glm::vec2(u.z, u.w));
-      const SphericalTriangle seen = triangle_from(t, origin.position);
+      if (origin.position != seen_from) seen = triangle_from(t, seen_from = origin.position);
       glm::vec3 to_opening;
       float solid_angle;
       if (seen.solid_angle() > kSmallSolidAngle) {

@@ -60,23 +60,40 @@ std::uint32_t owen_scramble(std::uint32_t x, std::uint32_t seed) {
   return reverse_bits(x);
 }
 
-float coordinate(std::uint32_t index, int dimension, std::uint32_t seed) {
+std::uint32_t plain_coordinate(std::uint32_t index, int dimension) {
   std::uint32_t x = 0;
   for (int bit = 0; index != 0; ++bit, index >>= 1)
     if (index & 1u) x ^= kDirections[dimension][bit];
-  x = owen_scramble(x, hash_seed(seed, static_cast<std::uint64_t>(dimension)));
-  return std::min(static_cast<float>(x) * 0x1p-32f, 0x1.fffffep-1f);
+  return x;
+}
+
+// The first points without scrambling: most receivers use no more.
+constexpr std::uint32_t kTabulated = 4096;
+const auto kTable = [] {
+  std::array<std::array<std::uint32_t, kDimensions>, kTabulated> table{};
+  for (std::uint32_t i = 0; i < kTabulated; ++i)
+    for (int d = 0; d < kDimensions; ++d) table[i][d] = plain_coordinate(i, d);
+  return table;
+}();
+
+float coordinate(std::uint32_t index, int dimension, std::uint32_t seed) {
+  const std::uint32_t plain = index < kTabulated ? kTable[index][dimension] : plain_coordinate(index, dimension);
+  return std::min(static_cast<float>(owen_scramble(plain, seed)) * 0x1p-32f, 0x1.fffffep-1f);
 }
 
 }  // namespace
 
+SobolSequence::SobolSequence(std::uint32_t seed) {
+  for (std::uint64_t d = 0; d < kDimensions; ++d) seeds_[d] = hash_seed(seed, d);
+}
+
 glm::vec2 SobolSequence::point2(std::uint32_t index) const {
-  return {coordinate(index, 0, seed_), coordinate(index, 1, seed_)};
+  return {coordinate(index, 0, seeds_[0]), coordinate(index, 1, seeds_[1])};
 }
 
 glm::vec4 SobolSequence::point4(std::uint32_t index) const {
-  return {coordinate(index, 0, seed_), coordinate(index, 1, seed_), coordinate(index, 2, seed_),
-          coordinate(index, 3, seed_)};
+  return {coordinate(index, 0, seeds_[0]), coordinate(index, 1, seeds_[1]), coordinate(index, 2, seeds_[2]),
+          coordinate(index, 3, seeds_[3])};
 }
 
 glm::vec2 sample_disc(glm::vec2 u) {

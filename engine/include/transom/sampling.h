@@ -19,14 +19,14 @@ inline std::uint32_t hash_seed(std::uint64_t a, std::uint64_t b) {
 /// Owen by hashing [Burley 2020, "Practical hash-based Owen scrambling"]. Every aligned block of 2^k points is a net.
 class SobolSequence {
  public:
-  explicit SobolSequence(std::uint32_t seed) : seed_(seed) {}
+  explicit SobolSequence(std::uint32_t seed);
 
   /// Point number `index`; coordinates in [0, 1).
   glm::vec2 point2(std::uint32_t index) const;
   glm::vec4 point4(std::uint32_t index) const;
 
  private:
-  std::uint32_t seed_;
+  std::array<std::uint32_t, 4> seeds_;  // by dimension
 };
 
 /// Maps the unit square to the unit disc, preserving area and neighbourhood [Shirley & Chiu 1997].
