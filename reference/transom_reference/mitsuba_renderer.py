@@ -22,7 +22,7 @@ from transom_reference.transport_scene import TransportScene, build_transport_sc
 Float64 = NDArray[np.float64]
 
 SENSOR_LOG2_SAMPLES = 6
-SENSOR_LANES_PER_BATCH = 1 << 15
+SENSOR_LANES_PER_BATCH = 1 << 12
 """Sensors share so many lanes, but each has at least one and at most 1024."""
 
 
