@@ -32,6 +32,12 @@ LEAST_BATCHES = 32
 
 COARSE_VISIBILITY = "volumes"
 
+PREVIEW_BATCHES = 8
+"""The same for pictures that need not be so quiet: early stages, and small pictures of hours."""
+
+JUDGED_PERCENT = 1.0
+"""References at least so quiet are judged against, and have LEAST_BATCHES."""
+
 GREATEST_GROWTH = 4.0
 """A noise estimate from few batches is not trusted to order more than this many times what was rendered."""
 
@@ -150,7 +156,7 @@ def _render_in_batches(
     """Renders, estimates the noise, orders as many batches as the target needs, until it is met."""
     case, target = question.case, question.target
     batches = cache_store().batches(case)
-    count = max(int(case.options["batches"]), LEAST_BATCHES if target else 2)
+    count = max(int(case.options["batches"]), 2) if target is None else _least_batches(target)
     resumed = sum(1 for index in range(count) if batches.has(index))
     image: ImageResult | None = None
     table: SensorTable | None = None
@@ -177,6 +183,10 @@ def _render_in_batches(
     if not keep_batches:
         cache_store().drop_batches(case)
     return bundle
+
+
+def _least_batches(target: Target) -> int:
+    return LEAST_BATCHES if target.percent <= JUDGED_PERCENT else PREVIEW_BATCHES
 
 
 def _picture(
