@@ -16,6 +16,7 @@ constexpr float kPi = std::numbers::pi_v<float>;
 constexpr int kMaximumCrossings = 16;      // openings looked through, one behind another
 constexpr std::size_t kBlock = 64;         // samples traced together
 constexpr float kSameNormal = 0.9995f;     // cosine between normals of one smooth or flat surface
+constexpr int kLargestMask = 4096;         // pixels a side of a stencil mask
 constexpr float kSameShare = 0.02f;        // of a beam, between neighbouring pixels without an edge
 
 }  // namespace
@@ -190,15 +191,19 @@ Frame FrameRenderer::render(const View& view, FrameOptions options) {
   const int width = view.width, height = view.height, s = std::max(1, options.edge_samples);
   const std::size_t pixel_count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
 
-  // Stencil masks at the resolution of the edge samples.
+  // Stencil masks at the resolution of the edge samples, or as fine as OpenGL's largest picture allows.
   BeamShare volumes;
   const bool use_volumes = options.visibility == Visibility::kVolumes;
+  const int mask_scale = std::clamp(kLargestMask / std::max(width, height), 1, s);
   if (use_volumes) {
     const TracePhase volume_phase(engine_.trace(), "volumes");
-    render_volumes(view, s, volumes.share);
+    render_volumes(view, mask_scale, volumes.share);
   }
   const BeamShare* shares = use_volumes ? &volumes : nullptr;
-  const auto mask_index = [&](int x, int y, int i, int j) { return (y * s + j) * width * s + x * s + i; };
+  const auto mask_index = [&](int x, int y, int i, int j) {
+    const int column = x * mask_scale + (2 * i + 1) * mask_scale / (2 * s), row = y * mask_scale + (2 * j + 1) * mask_scale / (2 * s);
+    return row * width * mask_scale + column;
+  };
 
   std::vector<Sample> centres(pixel_count);
   for (int y = 0; y < height; ++y)
