@@ -9,6 +9,7 @@
 #include "transom/error.h"
 #include "transom/parallel.h"
 #include "transom/sampling.h"
+#include "transom/survey.h"
 
 namespace transom {
 namespace {
@@ -17,20 +18,12 @@ constexpr float kPi = std::numbers::pi_v<float>;
 constexpr std::size_t kGrain = 8;
 constexpr int kMaximumSweeps = 20000;
 constexpr double kLeakTolerance = 2e-4;      // share of interior rays that may slip through the rounding of edges
-constexpr float kHollowShare = 0.25f;        // of first rays on the inside of a solid: then it is a room
-constexpr int kFirstRays = 64;               // per patch on openings and emitters, to find hollow components
+constexpr double kConnectedShare = 0.05;     // emitters up to this share of the interior's area are connected, not hit
 constexpr float kLeastDividedSize = 0.5f;    // of the longest edge of patches: smaller cells are fine enough as they are
 constexpr float kExposedNode = 0.5f;         // a node counts when at least this share of its rays is outside solids
 
 // Streams of random numbers: each use has its own.
-enum Stream : std::uint64_t { kPatchStream = 1, kNodeStream, kBeamStream, kSensorStream, kAuditStream, kHollowStream };
-
-float automatic_edge(const Faces& faces, int target_patch_count) {
-  double area = 0;
-  for (std::size_t f = 0; f < faces.faces.size(); ++f)
-    area += faces.faces[f].area * (faces.is_inside_solid(static_cast<int>(f), 1) ? 0.6 : 1.0);
-  return static_cast<float>(std::sqrt(area / target_patch_count));
-}
+enum Stream : std::uint64_t { kPatchStream = 1, kNodeStream, kBeamStream, kSensorStream, kAuditStream, kSurveyStream, kSourceStream };
 
 }  // namespace
 
@@ -42,13 +35,13 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
     faces_ = make_faces(scene_);
     rays_ = std::make_unique<RayScene>(faces_, scene_.materials, scene_.openings);
     sky_index_ = std::make_unique<SkyBinIndex>(sky_bins);
-    const float edge = options_.maximum_edge_m > 0 ? options_.maximum_edge_m
-                                                   : automatic_edge(faces_, options_.target_patch_count);
-    facts_.maximum_edge_m = edge;
-    mesh_ = std::make_unique<LightMesh>(faces_, edge, options_.elements_per_edge);
+    const std::vector<char> is_indoors =
+        survey_interior(scene_, *rays_, faces_, hash_seed(options_.seed, kSurveyStream));
+    const std::vector<float> edges = choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
+    facts_.maximum_edge_m = *std::min_element(edges.begin(), edges.end());
+    mesh_ = std::make_unique<LightMesh>(faces_, edges, options_.elements_per_edge);
     gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_);
     direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources);
-    open_hollow_components();
   }
   std::vector<GatherRow> rows;
   std::vector<int> divisions;
@@ -95,60 +88,13 @@ std::vector<int> Engine::first_slots() const {
   return slots;
 }
 
-// A closed surface that light starts inside of is a room, whatever way its faces look.
-void Engine::open_hollow_components() {
-  std::vector<Ray> rays;
-  std::vector<Hit> hits;
-  std::vector<int> count(faces_.component_is_solid.size());
-  const auto trace_and_open = [&] {
-    hits.resize(rays.size());
-    rays_->intersect(RayScene::What::kAll, rays, hits);
-    std::fill(count.begin(), count.end(), 0);
-    for (const Hit& hit : hits)
-      if (hit.face >= 0 && faces_.is_inside_solid(hit.face, hit.side)) ++count[faces_.faces[hit.face].component];
-    for (std::size_t c = 0; c < count.size(); ++c)
-      if (static_cast<float>(count[c]) > kHollowShare * static_cast<float>(rays.size())) faces_.component_is_solid[c] = 0;
-    rays.clear();
-  };
-  const std::vector<glm::vec3> axes{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  for (const PointSource& source : scene_.point_sources) {
-    const SobolSequence points(hash_seed(options_.seed, kHollowStream));
-    for (int i = 0; i < kFirstRays; ++i) {
-      const glm::vec2 u = points.point2(static_cast<std::uint32_t>(i));
-      const float z = 1 - 2 * u.x, r = std::sqrt(std::max(0.f, 1 - z * z));
-      rays.push_back({glm::vec3(source.position - faces_.origin),
-                      {r * std::cos(2 * kPi * u.y), r * std::sin(2 * kPi * u.y), z}});
-    }
-    trace_and_open();
-  }
-  for (std::size_t f = 0; f < faces_.faces.size(); ++f) {
-    const Face& face = faces_.faces[f];
-    const Material& material = scene_.materials[face.material];
-    const bool is_emitter = material.luminance != glm::vec3(0);
-    if (material.opening < 0 && !is_emitter) continue;
-    // Room sides of openings; both sides of emitters, since either may look into a room.
-    for (Side side = material.opening >= 0 ? 1 : 0; side < 2; ++side) {
-      if (is_emitter && side == 1 && faces_.component_is_solid[face.component] == 0) continue;
-      const SobolSequence points(hash_seed(options_.seed, kHollowStream + f));
-      for (int i = 0; i < kFirstRays; ++i) {
-        const glm::vec4 u = points.point4(static_cast<std::uint32_t>(i));
-        const glm::vec2 st = face.is_quad ? glm::vec2(u.z, u.w) : sample_triangle({u.z, u.w});
-        const glm::vec3 normal = side == 0 ? face.normal : -face.normal;
-        rays.push_back({mesh_->lifted_position(static_cast<int>(f), side, st),
-                        frame_from_normal(normal) * sample_cosine_hemisphere({u.x, u.y})});
-      }
-      trace_and_open();
-    }
-  }
-}
-
 // Rows wave by wave: what a patch sees becomes a patch in the next wave, until nothing new is seen.
 void Engine::find_patches(const std::vector<int>& first, std::vector<GatherRow>& rows) {
   patch_of_slot_.assign(static_cast<std::size_t>(mesh_->slot_count()), -1);
   const int per_slot = mesh_->elements_per_slot();
   std::vector<int> wave = first;
   for (std::size_t i = 0; i < scene_.point_sources.size(); ++i) {
-    const SobolSequence points(hash_seed(options_.seed, kHollowStream + i));
+    const SobolSequence points(hash_seed(options_.seed, kSourceStream + i));
     std::vector<Ray> rays;
     for (int k = 0; k < options_.node_samples.hemisphere; ++k) {
       const glm::vec2 u = points.point2(static_cast<std::uint32_t>(k));
@@ -261,6 +207,12 @@ void Engine::assemble_transfer(std::vector<GatherRow>& rows) {
     through_.append(to_patches(rows[p].through));
     patch_sky_.append(rows[p].sky);
   }
+  double emitting = 0, interior = 0;
+  for (std::size_t p = 0; p < n; ++p) {
+    if (is_interior_[p]) interior += patch_area_[p];
+    if (is_interior_[p] && patch_emitted_[p] != glm::vec3(0)) emitting += patch_area_[p];
+  }
+  connects_emitters_ = emitting < kConnectedShare * interior;
   facts_.defects = make_reciprocal(form_factors_, patch_area_, row_sums);
 }
 
@@ -317,6 +269,19 @@ glm::vec3 Engine::sky_light(const SparseRows& rows, std::size_t row) const {
   return sum + sky * lighting_.condition.sky_colour;
 }
 
+// What nodes are connected to: elements lit by beams, and small emitters.
+std::vector<BrightElement> Engine::bright_elements(const std::vector<LitElement>& lit) const {
+  const int per_slot = mesh_->elements_per_slot();
+  std::vector<BrightElement> bright;
+  for (const LitElement& e : lit)
+    bright.push_back({e.element, patch_reflectance_[patch_of_slot_[e.element / per_slot]] * e.illuminance});
+  if (!connects_emitters_) return bright;
+  for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)
+    if (patch_emitted_[p] != glm::vec3(0))
+      for (int e = 0; e < per_slot; ++e) bright.push_back({slot_of_patch_[p] * per_slot + e, patch_emitted_[p]});
+  return bright;
+}
+
 void Engine::relight(Condition condition) {
   condition.validate(sky_index_->count() - 1);
   lighting_.condition = std::move(condition);
@@ -326,7 +291,7 @@ void Engine::relight(Condition condition) {
   {
     const TracePhase phase(trace_, "beams");
     lit = direct_light_->deposit(lighting_.condition.beams, slot_of_patch_, hash_seed(options_.seed, kBeamStream));
-    first_bounce_ = std::make_unique<FirstBounce>(*mesh_, *rays_, lit, [&](int slot) { return patch_reflectance_[patch_of_slot_[slot]]; });
+    first_bounce_ = std::make_unique<FirstBounce>(*mesh_, *rays_, bright_elements(lit));
   }
   std::vector<glm::vec3> sky(n), from_beams(n, glm::vec3(0)), direct(n);
   {
@@ -349,7 +314,8 @@ void Engine::relight(Condition condition) {
     lighting_.patch_smooth_radiosity.resize(n);
     for (std::size_t p = 0; p < n; ++p)
       lighting_.patch_smooth_radiosity[p] =
-          patch_emitted_[p] + patch_reflectance_[p] * (lighting_.patch_irradiance[p] - from_beams[p]);
+          (connects_emitters_ ? glm::vec3(0) : patch_emitted_[p]) +
+          patch_reflectance_[p] * (lighting_.patch_irradiance[p] - from_beams[p]);
   }
   {
     const TracePhase phase(trace_, "gather");
@@ -369,7 +335,7 @@ glm::vec3 Engine::element_radiosity(int element) const {
   const int per_slot = mesh_->elements_per_slot();
   const int patch = patch_of_slot_[element / per_slot];
   if (patch < 0) return glm::vec3(0);
-  return lighting_.patch_smooth_radiosity[patch] +
+  return lighting_.patch_smooth_radiosity[patch] + (connects_emitters_ ? patch_emitted_[patch] : glm::vec3(0)) +
          patch_reflectance_[patch] * lighting_.element_direct[patch * per_slot + element % per_slot];
 }
 

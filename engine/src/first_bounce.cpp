@@ -19,8 +19,13 @@ struct Connection {
 
 }  // namespace
 
-void FirstBounce::add(const LitElement& lit, glm::vec3 reflectance) {
-  const int slot_index = lit.element / mesh_.elements_per_slot(), element = lit.element % mesh_.elements_per_slot();
+FirstBounce::FirstBounce(const LightMesh& mesh, const RayScene& rays, const std::vector<BrightElement>& bright)
+    : mesh_(mesh), rays_(rays) {
+  for (const BrightElement& element : bright) add(element);
+}
+
+void FirstBounce::add(const BrightElement& bright) {
+  const int slot_index = bright.element / mesh_.elements_per_slot(), element = bright.element % mesh_.elements_per_slot();
   const Slot slot = mesh_.slot(slot_index);
   const Face& face = mesh_.faces().faces[slot.face];
   const glm::vec3 normal = slot.side == 0 ? face.normal : -face.normal;
@@ -43,10 +48,14 @@ void FirstBounce::add(const LitElement& lit, glm::vec3 reflectance) {
   piece.middle = mesh_.lifted_position(
       slot.face, slot.side, mesh_.element_parameters(slot.face, slot.cell, element, is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3)));
   piece.area = mesh_.element_area(slot.face, slot.cell, element);
-  piece.radiosity = reflectance * lit.illuminance;
+  piece.radiosity = bright.radiosity;
   pieces_.push_back(piece);
 
-  const float weight = piece.area * (lit.illuminance.x + lit.illuminance.y + lit.illuminance.z);
+  const float weight = piece.area * (bright.radiosity.x + bright.radiosity.y + bright.radiosity.z);
+  if (!(weight > 0)) {
+    pieces_.pop_back();
+    return;
+  }
   patch.last_element = pieces_.size();
   patch.centroid = (patch.centroid * patch.weight + piece.middle * weight) / (patch.weight + weight);
   patch.weight += weight;

@@ -216,11 +216,12 @@ Frame FrameRenderer::render(const View& view, FrameOptions options) {
 
   // Edges: where neighbours see different surfaces or different shares of a beam.
   std::vector<char> is_edge(pixel_count, 0);
-  const auto differ = [](const Sample& a, const Sample& b) {
+  const float same_plane = 1e-4f * engine_.faces().extent;
+  const auto differ = [same_plane](const Sample& a, const Sample& b) {
     if (a.crossings != b.crossings || (a.face < 0) != (b.face < 0)) return true;
     if (std::abs(a.beam_signature - b.beam_signature) > kSameShare) return true;
     if (a.face == b.face) return a.side != b.side;
-    return glm::dot(a.normal, b.normal) < kSameNormal || std::abs(a.plane - b.plane) > 1e-4f * (1 + std::abs(a.plane));
+    return glm::dot(a.normal, b.normal) < kSameNormal || std::abs(a.plane - b.plane) > same_plane;
   };
   if (s > 1) {
     parallel_indices(static_cast<std::size_t>(height), 4, [&](std::size_t row) {

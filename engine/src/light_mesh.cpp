@@ -25,11 +25,11 @@ Grid make_grid(const Face& face, float maximum_edge) {
 
 }  // namespace
 
-LightMesh::LightMesh(const Faces& faces, float maximum_edge, int elements_per_edge)
+LightMesh::LightMesh(const Faces& faces, const std::vector<float>& maximum_edges, int elements_per_edge)
     : faces_(&faces), elements_per_edge_(elements_per_edge) {
   first_cell_.push_back(0);
   for (std::size_t f = 0; f < faces.faces.size(); ++f) {
-    grids_.push_back(make_grid(faces.faces[f], maximum_edge));
+    grids_.push_back(make_grid(faces.faces[f], maximum_edges[f]));
     first_cell_.push_back(first_cell_.back() + grids_.back().cell_count());
     face_of_cell_.resize(static_cast<std::size_t>(first_cell_.back()), static_cast<int>(f));
   }

@@ -42,8 +42,8 @@ class SolveOptions:
     elements_per_edge: int = 4
     patch_rays: int = 512
     patch_opening_rays: int = 128
-    node_rays: int = 2048
-    node_opening_rays: int = 512
+    node_rays: int = 1024
+    node_opening_rays: int = 256
     node_spacing: float = 6.0
     tolerance: float = 1e-6
     seed: int = 1

@@ -25,7 +25,7 @@ struct SolveOptions {
   int target_patch_count = 3000; ///< sides of cells that take part in the exchange of light, about
   int elements_per_edge = 4;     ///< a patch has the square of it
   GatherSamples patch_samples{512, 128};
-  GatherSamples node_samples{2048, 512};
+  GatherSamples node_samples{1024, 256};
   float node_spacing = 6;        ///< of nodes, against the harmonic mean distance of what a cell sees
   double tolerance = 1e-6;       ///< flux in flight at which interreflection stops, relative
   std::uint32_t seed = 1;
@@ -64,7 +64,7 @@ struct Lighting {
   Condition condition;
   std::vector<glm::vec3> node_sky, node_indirect;       ///< irradiance of each node [lx]
   std::vector<glm::vec3> patch_irradiance;              ///< all light [lx]
-  std::vector<glm::vec3> patch_smooth_radiosity;        ///< M + rho (E - direct) [lm/m²]
+  std::vector<glm::vec3> patch_smooth_radiosity;        ///< what nodes find by rays: M + rho (E - direct) [lm/m²]
   std::vector<glm::vec3> element_direct;                ///< patch * elements_per_slot + element [lx]
   int sweeps = 0;
 };
@@ -107,7 +107,6 @@ class Engine {
   const std::vector<int>& patch_slots() const { return slot_of_patch_; }
 
  private:
-  void open_hollow_components();
   void find_patches(const std::vector<int>& first_slots, std::vector<GatherRow>& rows);
   std::vector<int> first_slots() const;
   void mark_interior(const std::vector<GatherRow>& rows);
@@ -117,6 +116,7 @@ class Engine {
   void gather_nodes(const std::vector<int>& divisions);
   std::vector<Share> to_patches(const std::vector<Share>& elements) const;
   glm::vec3 sky_light(const SparseRows& rows, std::size_t row) const;
+  std::vector<BrightElement> bright_elements(const std::vector<LitElement>& lit) const;
   glm::vec3 element_radiosity(int element) const;
 
   SceneGeometry scene_;
@@ -137,6 +137,7 @@ class Engine {
   std::vector<float> patch_area_;   // exposed part [m²]
   std::vector<glm::vec3> patch_reflectance_, patch_emitted_;
   std::vector<char> is_interior_;
+  bool connects_emitters_ = false;  // small emitters: found by connection, not by rays
   SparseRows form_factors_, through_, patch_sky_;
 
   // Where light is shown.

@@ -1,26 +1,26 @@
-/// @file Light that beams and point sources throw on surfaces, on its way to points: the brightest and sharpest part of
-/// indirect light, found by connecting points to lit elements instead of waiting for rays to hit them.
+/// @file Light of small bright surfaces on its way to points: what beams and point sources have lit, and small emitters. It
+/// is found by connecting points to bright elements instead of waiting for rays to hit them.
 #pragma once
 
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "transom/deposit.h"
 #include "transom/light_mesh.h"
 #include "transom/ray_scene.h"
 
 namespace transom {
 
-/// The lit elements of a condition, by patch, ready to be looked at from points.
+/// An element that sends out light of its own, or a beam's: radiosity [lm/m²].
+struct BrightElement {
+  int element;  ///< counted over all slots
+  glm::vec3 radiosity;
+};
+
+/// The bright elements of a condition, by patch, ready to be looked at from points.
 class FirstBounce {
  public:
-  /// lit: as deposited, in the order of their slots. reflectance_of_slot: of each slot that is lit.
-  template <typename ReflectanceOfSlot>
-  FirstBounce(const LightMesh& mesh, const RayScene& rays, const std::vector<LitElement>& lit,
-              const ReflectanceOfSlot& reflectance_of_slot)
-      : mesh_(mesh), rays_(rays) {
-    for (const LitElement& e : lit) add(e, reflectance_of_slot(e.element / mesh.elements_per_slot()));
-  }
+  /// Elements of one slot stand together.
+  FirstBounce(const LightMesh& mesh, const RayScene& rays, const std::vector<BrightElement>& bright);
 
   /// Irradiance at a lifted point [lx]. A far patch counts as a point at the centroid of its light, a near one element by
   /// element, an adjacent element by its closed form; each with one ray for what stands between.
@@ -43,7 +43,7 @@ class FirstBounce {
     glm::vec3 radiosity;  // [lm/m²]
     float area;
   };
-  void add(const LitElement& lit, glm::vec3 reflectance);
+  void add(const BrightElement& bright);
 
   const LightMesh& mesh_;
   const RayScene& rays_;

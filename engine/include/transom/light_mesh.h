@@ -22,10 +22,10 @@ struct Node {
   glm::vec3 normal{0};    ///< unit; on a surface the shading normal of its side
 };
 
-/// Grids over all faces: cells no longer than a maximum edge, each split into elements_per_edge^2 elements.
+/// Grids over all faces: cells no longer than the face's maximum edge, each split into elements_per_edge^2 elements.
 class LightMesh {
  public:
-  LightMesh(const Faces& faces, float maximum_edge, int elements_per_edge);
+  LightMesh(const Faces& faces, const std::vector<float>& maximum_edges, int elements_per_edge);
 
   const Faces& faces() const { return *faces_; }
   int slot_count() const { return 2 * first_cell_.back(); }

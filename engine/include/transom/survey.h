@@ -1,0 +1,24 @@
+/// @file A first look at a scene, before it is meshed: which solids are rooms, and what lies indoors.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "transom/geometry.h"
+#include "transom/ray_scene.h"
+
+namespace transom {
+
+/// Follows random rays from where light enters or starts: the room sides of openings, emitters, point sources.
+///
+/// A closed surface that light starts inside of is a room, whatever way its faces look: its component is opened in `faces`.
+/// Returns for each face whether such rays, reflected a few times and never passing an opening, have met it: the faces
+/// indoors. Every random number comes from `seed`.
+std::vector<char> survey_interior(const SceneGeometry& scene, const RayScene& rays, Faces& faces, std::uint32_t seed);
+
+/// Longest edge of patches for each face [m]: `maximum_edge` indoors, or the one that gives about `target_patch_count`
+/// patches there where it is 0; outdoors coarser, so that a large ground costs little.
+std::vector<float> choose_edges(const Faces& faces, const std::vector<char>& is_indoors, float maximum_edge,
+                                int target_patch_count);
+
+}  // namespace transom

@@ -1,0 +1,146 @@
+#include "transom/survey.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "transom/sampling.h"
+
+namespace transom {
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+constexpr int kRaysPerSource = 256;        // from each face or point that light starts at
+constexpr int kReflections = 6;            // followed to find what lies indoors
+constexpr float kHollowShare = 0.25f;      // of a source's rays on the inside of a solid: then it is a room
+constexpr double kOutdoorPatchCount = 400;  // at most about so many patches outdoors
+
+glm::vec3 sample_sphere(glm::vec2 u) {
+  const float z = 1 - 2 * u.x, r = std::sqrt(std::max(0.f, 1 - z * z));
+  return {r * std::cos(2 * kPi * u.y), r * std::sin(2 * kPi * u.y), z};
+}
+
+glm::vec3 leave(const Faces& faces, int face, Side side, glm::vec2 st, glm::vec2 u, glm::vec3& direction) {
+  const Face& f = faces.faces[face];
+  const glm::vec3 normal = side == 0 ? f.normal : -f.normal;
+  direction = frame_from_normal(normal) * sample_cosine_hemisphere(u);
+  return f.position(st) + faces.ray_offset() * normal;
+}
+
+class Surveyor {
+ public:
+  Surveyor(const SceneGeometry& scene, const RayScene& rays, Faces& faces, std::uint32_t seed)
+      : scene_(scene), ray_scene_(rays), faces_(faces), seed_(seed), is_indoors_(faces.faces.size(), 0) {}
+
+  std::vector<char> run() {
+    for (const PointSource& source : scene_.point_sources) {
+      const SobolSequence points = next_sequence();
+      for (std::uint32_t i = 0; i < kRaysPerSource; ++i)
+        rays_.push_back({glm::vec3(source.position - faces_.origin), sample_sphere(points.point2(i))});
+      follow();
+    }
+    for (std::size_t f = 0; f < faces_.faces.size(); ++f) {
+      const Material& material = scene_.materials[faces_.faces[f].material];
+      const bool is_opening = material.opening >= 0;
+      if (!is_opening && material.luminance == glm::vec3(0)) continue;
+      // Room sides of openings; both sides of emitters, since either may look into a room.
+      for (Side side = is_opening ? 1 : 0; side < 2; ++side) {
+        if (!is_opening && faces_.is_inside_solid(static_cast<int>(f), side)) {
+          // A luminous solid may be a room with luminous walls: its inside must speak for itself.
+          if (!sees_only_itself(static_cast<int>(f))) continue;
+        }
+        is_indoors_[f] = 1;
+        start_from(static_cast<int>(f), side);
+        follow();
+      }
+    }
+    return is_indoors_;
+  }
+
+ private:
+  SobolSequence next_sequence() { return SobolSequence(hash_seed(seed_, ++sequence_)); }
+
+  void start_from(int face, Side side) {
+    const SobolSequence points = next_sequence();
+    for (std::uint32_t i = 0; i < kRaysPerSource; ++i) {
+      const glm::vec4 u = points.point4(i);
+      const glm::vec2 st = faces_.faces[face].is_quad ? glm::vec2(u.z, u.w) : sample_triangle({u.z, u.w});
+      Ray ray;
+      ray.origin = leave(faces_, face, side, st, {u.x, u.y}, ray.direction);
+      rays_.push_back(ray);
+    }
+  }
+
+  // The component emits everywhere and light from its front leaves the scene: what it lights is its inside.
+  bool sees_only_itself(int face) {
+    start_from(face, 0);
+    trace();
+    rays_.clear();
+    return std::none_of(hits_.begin(), hits_.end(), [](const Hit& hit) { return hit.face >= 0; });
+  }
+
+  void trace() {
+    hits_.resize(rays_.size());
+    ray_scene_.intersect(RayScene::What::kAll, rays_, hits_);
+  }
+
+  void follow() {
+    for (int reflection = 0; reflection < kReflections && !rays_.empty(); ++reflection) {
+      trace();
+      if (reflection == 0) open_hollow();
+      const SobolSequence points = next_sequence();
+      std::size_t kept = 0;
+      for (std::size_t i = 0; i < hits_.size(); ++i) {
+        const Hit& hit = hits_[i];
+        if (hit.face < 0 || faces_.is_inside_solid(hit.face, hit.side)) continue;
+        if (scene_.materials[faces_.faces[hit.face].material].opening >= 0) continue;
+        is_indoors_[hit.face] = 1;
+        Ray next;
+        next.origin = leave(faces_, hit.face, hit.side, hit.st, points.point2(static_cast<std::uint32_t>(i)), next.direction);
+        rays_[kept++] = next;
+      }
+      rays_.resize(kept);
+    }
+    rays_.clear();
+  }
+
+  void open_hollow() {
+    std::vector<int> count(faces_.component_is_solid.size(), 0);
+    for (const Hit& hit : hits_)
+      if (hit.face >= 0 && faces_.is_inside_solid(hit.face, hit.side)) ++count[faces_.faces[hit.face].component];
+    for (std::size_t c = 0; c < count.size(); ++c)
+      if (static_cast<float>(count[c]) > kHollowShare * static_cast<float>(hits_.size())) faces_.component_is_solid[c] = 0;
+  }
+
+  const SceneGeometry& scene_;
+  const RayScene& ray_scene_;
+  Faces& faces_;
+  std::uint32_t seed_;
+  std::uint64_t sequence_ = 0;
+  std::vector<char> is_indoors_;
+  std::vector<Ray> rays_;
+  std::vector<Hit> hits_;
+};
+
+}  // namespace
+
+std::vector<char> survey_interior(const SceneGeometry& scene, const RayScene& rays, Faces& faces, std::uint32_t seed) {
+  return Surveyor(scene, rays, faces, seed).run();
+}
+
+std::vector<float> choose_edges(const Faces& faces, const std::vector<char>& is_indoors, float maximum_edge,
+                                int target_patch_count) {
+  double indoors = 0, outdoors = 0;
+  for (std::size_t f = 0; f < faces.faces.size(); ++f) {
+    const double sides = faces.is_inside_solid(static_cast<int>(f), 1) ? 1 : 2;
+    (is_indoors[f] ? indoors : outdoors) += sides * faces.faces[f].area;
+  }
+  if (indoors == 0) std::swap(indoors, outdoors);
+  const double edge = maximum_edge > 0 ? maximum_edge : std::sqrt(indoors / target_patch_count);
+  const double outdoor_edge = std::max(edge, std::sqrt(outdoors / kOutdoorPatchCount));
+  std::vector<float> edges;
+  for (const char indoor : is_indoors) edges.push_back(static_cast<float>(indoor || indoors == 0 ? edge : outdoor_edge));
+  return edges;
+}
+
+}  // namespace transom
