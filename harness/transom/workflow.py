@@ -135,12 +135,12 @@ def judge_compared(name: str, build: Path) -> list[Verdict]:
 def print_verdicts(verdicts: Collection[Verdict]) -> None:
     """A table on standard output: what did not pass first. Sensors that passed are only counted."""
     order = list(reversed(Outcome))
-    table = Table("verdict", "quantity", "case", "difference %", "k u %", "tolerance %", box=None)
+    table = Table("verdict", "quantity", "case", "difference %", "b %", "k u %", "tolerance %", box=None)
     for verdict in sorted(verdicts, key=lambda entry: order.index(entry.outcome)):
         if verdict.outcome is Outcome.PASS and verdict.quantity == "sensor_percent":
             continue
         case = " ".join(part for part in _place(verdict) if part)
-        numbers = (verdict.difference, verdict.expanded_uncertainty, verdict.tolerance)
+        numbers = (verdict.difference, verdict.numerical_bias, verdict.expanded_uncertainty, verdict.tolerance)
         cells = ["" if number is None else f"{number:.3g}" for number in numbers]
         table.add_row(verdict.outcome, verdict.quantity or verdict.reason, case, *cells)
     console = Console()
