@@ -53,8 +53,11 @@ NB_MODULE(_engine, m) {
   nb::exception<InputError>(m, "EngineInputError", PyExc_ValueError);
   nb::exception<GlError>(m, "GlError", PyExc_RuntimeError);
 
-  m.def("gl_backend", [] { return GlContext().name(); }, "Name of the OpenGL context that volumes would use.");
-  m.def("build_description", [] { return std::string(build_description()); }, "Compiler, flags and libraries of this build.");
+  m.def(
+      "gl_backend", [] { return GlContext().name(); }, "Name of the OpenGL context that volumes would use.");
+  m.def(
+      "build_description", [] { return std::string(build_description()); },
+      "Compiler, flags and libraries of this build.");
 
   nb::class_<OpeningGroup>(m, "OpeningGroup")
       .def(nb::init<>())
@@ -75,26 +78,29 @@ NB_MODULE(_engine, m) {
             self->corner_normals = to_vector<glm::vec3>(corner_normals);
           },
           "vertices"_a, "faces"_a, "face_material"_a, "corner_normals"_a)
-      .def("add_material",
-           [](SceneGeometry& s, std::tuple<float, float, float> rho, std::tuple<float, float, float> luminance, bool smooth,
-              int opening) {
-             const auto [r, g, b] = rho;
-             const auto [lr, lg, lb] = luminance;
-             s.materials.push_back({{r, g, b}, {lr, lg, lb}, smooth, opening});
-           },
-           "reflectance"_a, "luminance"_a, "smooth"_a, "opening"_a)
-      .def("add_opening",
-           [](SceneGeometry& s, In<float, nb::ndim<1>> table, float diffuse_reflectance) {
-             s.openings.push_back({to_vector<float>(table), diffuse_reflectance});
-           },
-           "transmittance"_a, "diffuse_reflectance"_a)
-      .def("add_point_source",
-           [](SceneGeometry& s, std::tuple<double, double, double> position, std::tuple<float, float, float> intensity) {
-             const auto [x, y, z] = position;
-             const auto [r, g, b] = intensity;
-             s.point_sources.push_back({{x, y, z}, {r, g, b}});
-           },
-           "position"_a, "intensity"_a);
+      .def(
+          "add_material",
+          [](SceneGeometry& s, std::tuple<float, float, float> rho, std::tuple<float, float, float> luminance,
+             bool smooth, int opening) {
+            const auto [r, g, b] = rho;
+            const auto [lr, lg, lb] = luminance;
+            s.materials.push_back({{r, g, b}, {lr, lg, lb}, smooth, opening});
+          },
+          "reflectance"_a, "luminance"_a, "smooth"_a, "opening"_a)
+      .def(
+          "add_opening",
+          [](SceneGeometry& s, In<float, nb::ndim<1>> table, float diffuse_reflectance) {
+            s.openings.push_back({to_vector<float>(table), diffuse_reflectance});
+          },
+          "transmittance"_a, "diffuse_reflectance"_a)
+      .def(
+          "add_point_source",
+          [](SceneGeometry& s, std::tuple<double, double, double> position, std::tuple<float, float, float> intensity) {
+            const auto [x, y, z] = position;
+            const auto [r, g, b] = intensity;
+            s.point_sources.push_back({{x, y, z}, {r, g, b}});
+          },
+          "position"_a, "intensity"_a);
 
   nb::class_<SkyBins>(m, "SkyBins")
       .def(
@@ -153,31 +159,32 @@ NB_MODULE(_engine, m) {
             self->picture_width = static_cast<int>(sky_picture.shape(1));
           },
           "sky_luminance"_a, "sky_colour"_a, "ground_luminance"_a, "sky_picture"_a)
-      .def("add_beam",
-           [](Condition& c, std::tuple<float, float, float> direction, std::tuple<float, float, float> illuminance) {
-             const auto [x, y, z] = direction;
-             const auto [r, g, b] = illuminance;
-             c.beams.push_back({{x, y, z}, {r, g, b}});
-           },
-           "direction_to_source"_a, "normal_illuminance"_a);
-
-  nb::class_<View>(m, "View")
       .def(
-          "__init__",
-          [](View* self, std::tuple<double, double, double> position, std::tuple<double, double, double> target,
-             std::tuple<double, double, double> up, double vertical_fov_rad, int width, int height) {
-            const auto at = [](const std::tuple<double, double, double>& t) {
-              return glm::dvec3(std::get<0>(t), std::get<1>(t), std::get<2>(t));
-            };
-            new (self) View{at(position), at(target), at(up), vertical_fov_rad, width, height};
+          "add_beam",
+          [](Condition& c, std::tuple<float, float, float> direction, std::tuple<float, float, float> illuminance) {
+            const auto [x, y, z] = direction;
+            const auto [r, g, b] = illuminance;
+            c.beams.push_back({{x, y, z}, {r, g, b}});
           },
-          "position"_a, "target"_a, "up"_a, "vertical_fov_rad"_a, "width"_a, "height"_a);
+          "direction_to_source"_a, "normal_illuminance"_a);
+
+  nb::class_<View>(m, "View").def(
+      "__init__",
+      [](View* self, std::tuple<double, double, double> position, std::tuple<double, double, double> target,
+         std::tuple<double, double, double> up, double vertical_fov_rad, int width, int height) {
+        const auto at = [](const std::tuple<double, double, double>& t) {
+          return glm::dvec3(std::get<0>(t), std::get<1>(t), std::get<2>(t));
+        };
+        new (self) View{at(position), at(target), at(up), vertical_fov_rad, width, height};
+      },
+      "position"_a, "target"_a, "up"_a, "vertical_fov_rad"_a, "width"_a, "height"_a);
 
   m.def(
       "trace_primary",
       [](const SceneGeometry& scene, const View& view) {
         PrimaryHits hits = trace_primary(scene, view);
-        const std::vector<std::size_t> shape{static_cast<std::size_t>(view.height), static_cast<std::size_t>(view.width)};
+        const std::vector<std::size_t> shape{static_cast<std::size_t>(view.height),
+                                             static_cast<std::size_t>(view.width)};
         return nb::make_tuple(to_array<int>(std::move(hits.face), shape),
                               to_array<double>(std::move(hits.position), {shape[0], shape[1], 3}));
       },
@@ -189,8 +196,9 @@ NB_MODULE(_engine, m) {
       .def(nb::init<SceneGeometry, const SkyBins&, SolveOptions>(), "scene"_a, "sky_bins"_a, "options"_a,
            nb::call_guard<nb::gil_scoped_release>(), "Solves the scene: everything that depends on geometry alone.")
       .def_prop_ro("facts", [](const Session& s) { return s.engine.facts(); })
-      .def("relight", [](Session& s, const Condition& c) { s.engine.relight(c); }, "condition"_a,
-           nb::call_guard<nb::gil_scoped_release>())
+      .def(
+          "relight", [](Session& s, const Condition& c) { s.engine.relight(c); }, "condition"_a,
+          nb::call_guard<nb::gil_scoped_release>())
       .def(
           "render",
           [](Session& s, const View& view, Visibility visibility, int edge_samples) {
@@ -213,7 +221,8 @@ NB_MODULE(_engine, m) {
           "view"_a, "visibility"_a, "edge_samples"_a)
       .def(
           "illuminance",
-          [](const Session& s, In<double, nb::shape<-1, 3>> points, In<float, nb::shape<-1, 3>> normals, GatherSamples samples) {
+          [](const Session& s, In<double, nb::shape<-1, 3>> points, In<float, nb::shape<-1, 3>> normals,
+             GatherSamples samples) {
             std::vector<Irradiance> e;
             {
               const nb::gil_scoped_release release;
@@ -222,8 +231,7 @@ NB_MODULE(_engine, m) {
             const std::size_t n = e.size();
             return to_array<float>(std::move(e), {n, 3, 3});
           },
-          "points"_a, "normals"_a, "samples"_a,
-          "Irradiance (N, 3, 3): rows direct, sky, indirect; columns RGB [lx].")
+          "points"_a, "normals"_a, "samples"_a, "Irradiance (N, 3, 3): rows direct, sky, indirect; columns RGB [lx].")
       .def(
           "audit",
           [](const Session& s, int rays_per_opening) {
@@ -239,34 +247,38 @@ NB_MODULE(_engine, m) {
             return result;
           },
           "rays_per_opening"_a, "Flux balance of the interior [lm], linear RGB.")
-      .def_prop_ro("form_factors",
-                   [](const Session& s) {
-                     const SparseRows& f = s.engine.form_factors();
-                     std::vector<int> columns;
-                     std::vector<float> values;
-                     std::vector<long long> begin(f.begin.begin(), f.begin.end());
-                     for (const Share& share : f.entries) {
-                       columns.push_back(share.index);
-                       values.push_back(share.weight);
-                     }
-                     const std::size_t count = columns.size(), rows = begin.size();
-                     return nb::make_tuple(to_array<long long>(std::move(begin), {rows}),
-                                           to_array<int>(std::move(columns), {count}),
-                                           to_array<float>(std::move(values), {count}));
-                   },
-                   "Form factors between patches as compressed sparse rows: begin, column, value.")
-      .def_prop_ro("patch_areas",
-                   [](const Session& s) {
-                     std::vector<float> areas = s.engine.patch_areas();
-                     const std::size_t n = areas.size();
-                     return to_array<float>(std::move(areas), {n});
-                   },
-                   "Exposed area of each patch [m²].")
+      .def_prop_ro(
+          "form_factors",
+          [](const Session& s) {
+            const SparseRows& f = s.engine.form_factors();
+            std::vector<int> columns;
+            std::vector<float> values;
+            std::vector<long long> begin(f.begin.begin(), f.begin.end());
+            for (const Share& share : f.entries) {
+              columns.push_back(share.index);
+              values.push_back(share.weight);
+            }
+            const std::size_t count = columns.size(), rows = begin.size();
+            return nb::make_tuple(to_array<long long>(std::move(begin), {rows}),
+                                  to_array<int>(std::move(columns), {count}),
+                                  to_array<float>(std::move(values), {count}));
+          },
+          "Form factors between patches as compressed sparse rows: begin, column, value.")
+      .def_prop_ro(
+          "patch_areas",
+          [](const Session& s) {
+            std::vector<float> areas = s.engine.patch_areas();
+            const std::size_t n = areas.size();
+            return to_array<float>(std::move(areas), {n});
+          },
+          "Exposed area of each patch [m²].")
       .def_prop_ro("sweeps", [](const Session& s) { return s.engine.lighting().sweeps; })
-      .def_prop_ro("trace", [](Session& s) {
-        nb::list events;
-        for (const TraceEvent& e : s.engine.trace().events()) events.append(nb::make_tuple(e.name, e.begin_s, e.end_s));
-        return events;
-      })
+      .def_prop_ro("trace",
+                   [](Session& s) {
+                     nb::list events;
+                     for (const TraceEvent& e : s.engine.trace().events())
+                       events.append(nb::make_tuple(e.name, e.begin_s, e.end_s));
+                     return events;
+                   })
       .def("clear_trace", [](Session& s) { s.engine.trace().clear(); });
 }

@@ -12,8 +12,8 @@ constexpr std::uint32_t kAuditSeed = 0x5eed0a0d;
 
 }  // namespace
 
-// Flux in is sampled here from the openings outwards, with rays of its own: nothing of the solve is used but the radiosity
-// of outdoor surfaces.
+// Flux in is sampled here from the openings outwards, with rays of its own: nothing of the solve is used but the
+// radiosity of outdoor surfaces.
 EnergyAudit Engine::audit(int rays_per_opening) const {
   EnergyAudit audit;
   const Condition& condition = lighting_.condition;
@@ -46,8 +46,8 @@ EnergyAudit Engine::audit(int rays_per_opening) const {
         audit.in_reflected += glm::dvec3(share / kPi * element_radiosity(mesh_->element_at(hits[i])));
       } else {
         const int bin = (*sky_index_)(rays[i].direction);
-        audit.in_sky += glm::dvec3(share * (bin == ground ? condition.ground_luminance
-                                                          : condition.sky_luminance[bin] * condition.sky_colour));
+        audit.in_sky += glm::dvec3(
+            share * (bin == ground ? condition.ground_luminance : condition.sky_luminance[bin] * condition.sky_colour));
       }
     }
     for (const Beam& beam : condition.beams) {
@@ -57,8 +57,9 @@ EnergyAudit Engine::audit(int rays_per_opening) const {
       rays_->occluded(RayScene::What::kOpaque, rays, blocked);
       for (std::size_t i = 0; i < rays.size(); ++i)
         if (!blocked[i])
-          audit.in_beams += glm::dvec3(beam.normal_illuminance) *
-                            static_cast<double>(flux_share * cosine * group.transmittance_at(cosine) * rays_->transmittance(rays[i]));
+          audit.in_beams +=
+              glm::dvec3(beam.normal_illuminance) *
+              static_cast<double>(flux_share * cosine * group.transmittance_at(cosine) * rays_->transmittance(rays[i]));
     }
   }
   for (const PointSource& source : scene_.point_sources) audit.in_emitted += glm::dvec3(4 * kPi * source.intensity);

@@ -2,6 +2,8 @@
 
 namespace transom {
 
-const char* build_description() { return TRANSOM_VERSION ", " TRANSOM_BUILD; }
+const char* build_description() {
+  return TRANSOM_VERSION ", " TRANSOM_BUILD;
+}
 
 }  // namespace transom

@@ -8,7 +8,7 @@
 namespace transom {
 namespace {
 
-constexpr int kSamplesPerElement = 4;        // to find out which patches are lit, and wholly or partly
+constexpr int kSamplesPerElement = 4;          // to find out which patches are lit, and wholly or partly
 constexpr int kRefinedSamplesPerElement = 64;  // on patches that are partly lit
 constexpr std::size_t kGrain = 8;
 
@@ -20,7 +20,8 @@ DirectLight::DirectLight(const LightMesh& mesh, const RayScene& rays, const std:
     sources_.push_back({glm::vec3(source.position - mesh.faces().origin), source.intensity});
 }
 
-void DirectLight::beam_transmission(glm::vec3 direction, std::span<const glm::vec3> points, std::span<float> share) const {
+void DirectLight::beam_transmission(glm::vec3 direction, std::span<const glm::vec3> points,
+                                    std::span<float> share) const {
   std::vector<Ray> rays(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) rays[i] = {points[i], direction};
   std::vector<std::uint8_t> blocked(points.size());

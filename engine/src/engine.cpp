@@ -17,13 +17,21 @@ namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr std::size_t kGrain = 8;
 constexpr int kMaximumSweeps = 20000;
-constexpr double kLeakTolerance = 2e-4;      // share of interior rays that may slip through the rounding of edges
-constexpr double kConnectedShare = 0.05;     // emitters up to this share of the interior's area are connected, not hit
-constexpr float kLeastDividedSize = 0.5f;    // of the longest edge of patches: smaller cells are fine enough as they are
-constexpr float kExposedNode = 0.5f;         // a node counts when at least this share of its rays is outside solids
+constexpr double kLeakTolerance = 2e-4;    // share of interior rays that may slip through the rounding of edges
+constexpr double kConnectedShare = 0.05;   // emitters up to this share of the interior's area are connected, not hit
+constexpr float kLeastDividedSize = 0.5f;  // of the longest edge of patches: smaller cells are fine enough as they are
+constexpr float kExposedNode = 0.5f;       // a node counts when at least this share of its rays is outside solids
 
 // Streams of random numbers: each use has its own.
-enum Stream : std::uint64_t { kPatchStream = 1, kNodeStream, kBeamStream, kSensorStream, kAuditStream, kSurveyStream, kSourceStream };
+enum Stream : std::uint64_t {
+  kPatchStream = 1,
+  kNodeStream,
+  kBeamStream,
+  kSensorStream,
+  kAuditStream,
+  kSurveyStream,
+  kSourceStream
+};
 
 }  // namespace
 
@@ -37,7 +45,8 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
     sky_index_ = std::make_unique<SkyBinIndex>(sky_bins);
     const std::vector<char> is_indoors =
         survey_interior(scene_, *rays_, faces_, hash_seed(options_.seed, kSurveyStream));
-    const std::vector<float> edges = choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
+    const std::vector<float> edges =
+        choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
     facts_.maximum_edge_m = *std::min_element(edges.begin(), edges.end());
     mesh_ = std::make_unique<LightMesh>(faces_, edges, options_.elements_per_edge);
     gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_);
@@ -82,7 +91,8 @@ std::vector<int> Engine::first_slots() const {
     const bool is_emitter = material.luminance != glm::vec3(0);
     for (Side side = 0; side < 2; ++side) {
       if (material.opening >= 0 ? side == 0 : (!is_emitter || faces_.is_inside_solid(face, side))) continue;
-      for (int cell = 0; cell < mesh_->grid(face).cell_count(); ++cell) slots.push_back(mesh_->slot_index(face, side, cell));
+      for (int cell = 0; cell < mesh_->grid(face).cell_count(); ++cell)
+        slots.push_back(mesh_->slot_index(face, side, cell));
     }
   }
   return slots;
@@ -105,7 +115,8 @@ void Engine::find_patches(const std::vector<int>& first, std::vector<GatherRow>&
     std::vector<Hit> hits(rays.size());
     rays_->intersect(RayScene::What::kAll, rays, hits);
     for (const Hit& hit : hits)
-      if (hit.face >= 0 && !faces_.is_inside_solid(hit.face, hit.side)) wave.push_back(mesh_->element_at(hit) / per_slot);
+      if (hit.face >= 0 && !faces_.is_inside_solid(hit.face, hit.side))
+        wave.push_back(mesh_->element_at(hit) / per_slot);
   }
   std::sort(wave.begin(), wave.end());
   wave.erase(std::unique(wave.begin(), wave.end()), wave.end());
@@ -153,7 +164,8 @@ void Engine::mark_interior(const std::vector<GatherRow>& rows) {
   };
   // An emitter that sees the sky is a lamp outdoors, or the outside of a luminous wall.
   for (const int slot : first_slots())
-    if (scene_.materials[faces_.faces[mesh_->slot(slot).face].material].opening >= 0 || rows[patch_of_slot_[slot]].escaped == 0)
+    if (scene_.materials[faces_.faces[mesh_->slot(slot).face].material].opening >= 0 ||
+        rows[patch_of_slot_[slot]].escaped == 0)
       mark(patch_of_slot_[slot]);
   if (!scene_.point_sources.empty())
     for (std::size_t p = 0; p < rows.size(); ++p) mark(static_cast<int>(p));
@@ -178,15 +190,18 @@ void Engine::check_closed(const std::vector<GatherRow>& rows) {
   if (facts_.leak_share <= kLeakTolerance) return;
   const Slot slot = mesh_->slot(slot_of_patch_[worst_patch]);
   const glm::dvec3 place =
-      faces_.origin + glm::dvec3(mesh_->lifted_position(slot.face, slot.side, mesh_->cell_parameters(slot.face, slot.cell, glm::vec2(1.f / 3))));
+      faces_.origin + glm::dvec3(mesh_->lifted_position(
+                          slot.face, slot.side, mesh_->cell_parameters(slot.face, slot.cell, glm::vec2(1.f / 3))));
   std::ostringstream text;
   text.precision(3);
   if (scene_.materials[faces_.faces[slot.face].material].opening >= 0)
-    text << "face " << faces_.faces[slot.face].source << ", an opening, looks the wrong way near (" << std::fixed << place.x << ", " << place.y << ", "
-         << place.z << ") m: " << 100 * worst << " % of the rays from its back leave the building. Turn its front outdoors";
+    text << "face " << faces_.faces[slot.face].source << ", an opening, looks the wrong way near (" << std::fixed
+         << place.x << ", " << place.y << ", " << place.z << ") m: " << 100 * worst
+         << " % of the rays from its back leave the building. Turn its front outdoors";
   else
-    text << "open wall: " << 100 * facts_.leak_share << " % of the rays in the room leave it without passing an opening, most near ("
-         << std::fixed << place.x << ", " << place.y << ", " << place.z << ") m, face " << faces_.faces[slot.face].source
+    text << "open wall: " << 100 * facts_.leak_share
+         << " % of the rays in the room leave it without passing an opening, most near (" << std::fixed << place.x
+         << ", " << place.y << ", " << place.z << ") m, face " << faces_.faces[slot.face].source
          << ". Close the gap, or declare it as an opening with glazing = \"none\"";
   throw InputError(text.str());
 }
@@ -216,8 +231,8 @@ void Engine::assemble_transfer(std::vector<GatherRow>& rows) {
   facts_.defects = make_reciprocal(form_factors_, patch_area_, row_sums);
 }
 
-// Cells are divided where the harmonic mean distance of what they see is short against their size: there irradiance changes
-// within the cell [after Ward & Heckbert 1992].
+// Cells are divided where the harmonic mean distance of what they see is short against their size: there irradiance
+// changes within the cell [after Ward & Heckbert 1992].
 std::vector<int> Engine::cell_divisions(const std::vector<GatherRow>& rows) const {
   std::vector<int> divisions;
   for (std::size_t p = 0; p < rows.size(); ++p) {
@@ -242,7 +257,8 @@ void Engine::gather_nodes(const std::vector<int>& divisions) {
   facts_.node_count = static_cast<int>(nodes.size());
   std::vector<GatherRow> rows(nodes.size());
   parallel_indices(nodes.size(), kGrain, [&](std::size_t i) {
-    rows[i] = gatherer_->gather_at_point(nodes[i], options_.node_samples, hash_seed(options_.seed, hash_seed(kNodeStream, i)));
+    rows[i] = gatherer_->gather_at_point(nodes[i], options_.node_samples,
+                                         hash_seed(options_.seed, hash_seed(kNodeStream, i)));
     rows[i].reached.insert(rows[i].reached.end(), rows[i].through.begin(), rows[i].through.end());
     rows[i].reached = to_patches(rows[i].reached);
   });
@@ -304,18 +320,19 @@ void Engine::relight(Condition condition) {
     for (const LitElement& e : lit) {
       const int patch = patch_of_slot_[e.element / per_slot];
       const Slot slot = mesh_->slot(e.element / per_slot);
-      from_beams[patch] += e.illuminance * (mesh_->element_area(slot.face, slot.cell, e.element % per_slot) / patch_area_[patch]);
+      from_beams[patch] +=
+          e.illuminance * (mesh_->element_area(slot.face, slot.cell, e.element % per_slot) / patch_area_[patch]);
       lighting_.element_direct[patch * per_slot + e.element % per_slot] = e.illuminance;
     }
     for (std::size_t p = 0; p < n; ++p) direct[p] = sky[p] + from_beams[p];
     lighting_.patch_irradiance = direct;
-    lighting_.sweeps = solve_interreflection(form_factors_, through_, patch_reflectance_, patch_emitted_, direct, patch_area_,
-                                             options_.tolerance, kMaximumSweeps, lighting_.patch_irradiance);
+    lighting_.sweeps =
+        solve_interreflection(form_factors_, through_, patch_reflectance_, patch_emitted_, direct, patch_area_,
+                              options_.tolerance, kMaximumSweeps, lighting_.patch_irradiance);
     lighting_.patch_smooth_radiosity.resize(n);
     for (std::size_t p = 0; p < n; ++p)
-      lighting_.patch_smooth_radiosity[p] =
-          (connects_emitters_ ? glm::vec3(0) : patch_emitted_[p]) +
-          patch_reflectance_[p] * (lighting_.patch_irradiance[p] - from_beams[p]);
+      lighting_.patch_smooth_radiosity[p] = (connects_emitters_ ? glm::vec3(0) : patch_emitted_[p]) +
+                                            patch_reflectance_[p] * (lighting_.patch_irradiance[p] - from_beams[p]);
   }
   {
     const TracePhase phase(trace_, "gather");
@@ -339,13 +356,14 @@ glm::vec3 Engine::element_radiosity(int element) const {
          patch_reflectance_[patch] * lighting_.element_direct[patch * per_slot + element % per_slot];
 }
 
-std::vector<Irradiance> Engine::illuminance(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
-                                            GatherSamples samples) const {
+std::vector<Irradiance> Engine::illuminance(const std::vector<glm::dvec3>& points,
+                                            const std::vector<glm::vec3>& normals, GatherSamples samples) const {
   std::vector<Irradiance> result(points.size());
   parallel_indices(points.size(), 1, [&](std::size_t i) {
     const glm::vec3 normal = glm::normalize(normals[i]);
     const Node node{glm::vec3(points[i] - faces_.origin) + faces_.ray_offset() * normal, normal};
-    const GatherRow row = gatherer_->gather_at_point(node, samples, hash_seed(options_.seed, hash_seed(kSensorStream, i)));
+    const GatherRow row =
+        gatherer_->gather_at_point(node, samples, hash_seed(options_.seed, hash_seed(kSensorStream, i)));
     SparseRows sky;
     sky.append(row.sky);
     result[i].direct = direct_light_->illuminance(lighting_.condition.beams, node.position, normal);

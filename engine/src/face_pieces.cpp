@@ -24,7 +24,7 @@ struct Cutter {
   double least_share;  // of the cut, that the face itself must cover
 };
 
-constexpr double kTolerance = 1e-6;     // of the extent: how near two faces are that meet
+constexpr double kTolerance = 1e-6;    // of the extent: how near two faces are that meet
 constexpr double kWallShare = 0.5;     // a wall that covers half of the cut parts what it stands on; furniture does not
 constexpr double kWallExtent2 = 1e-3;  // least area of a wall, against the square of the scene's extent
 
@@ -98,7 +98,8 @@ std::vector<FacePiece> cut_faces(const SceneGeometry& scene, glm::dvec3 origin, 
     const glm::ivec4& face = scene.faces[f];
     const int count = face.w >= 0 ? 4 : 3;
     for (int k = 0; k < count; ++k) {
-      const glm::dvec3 normal = scene.corner_normals.empty() ? glm::dvec3(0) : glm::dvec3(scene.corner_normals[4 * f + k]);
+      const glm::dvec3 normal =
+          scene.corner_normals.empty() ? glm::dvec3(0) : glm::dvec3(scene.corner_normals[4 * f + k]);
       polygon.push_back({scene.vertices[face[k]] - origin, normal});
     }
     return polygon;
@@ -109,10 +110,10 @@ std::vector<FacePiece> cut_faces(const SceneGeometry& scene, glm::dvec3 origin, 
     const bool is_opening = scene.materials[scene.face_material[f]].opening >= 0;
     Cutter cutter;
     for (const Corner& c : polygon) cutter.corner.push_back(c.position);
-    const glm::dvec3 twice_area = glm::cross(cutter.corner[1] - cutter.corner[0], cutter.corner[2] - cutter.corner[0]) +
-                                  (polygon.size() == 4 ? glm::cross(cutter.corner[2] - cutter.corner[0],
-                                                                    cutter.corner[3] - cutter.corner[0])
-                                                       : glm::dvec3(0));
+    const glm::dvec3 twice_area =
+        glm::cross(cutter.corner[1] - cutter.corner[0], cutter.corner[2] - cutter.corner[0]) +
+        (polygon.size() == 4 ? glm::cross(cutter.corner[2] - cutter.corner[0], cutter.corner[3] - cutter.corner[0])
+                             : glm::dvec3(0));
     if (!(glm::length(twice_area) > (is_opening ? 0.0 : 2 * kWallExtent2 * extent * extent))) continue;
     cutter.normal = glm::normalize(twice_area);
     cutter.box = box_of(cutter.corner, 2 * tolerance, [](const glm::dvec3& p) { return p; });
@@ -136,7 +137,8 @@ std::vector<FacePiece> cut_faces(const SceneGeometry& scene, glm::dvec3 origin, 
       }
     }
     for (const Polygon& part : parts)
-      for (std::size_t first = 1; first + 1 < part.size(); first += 2) {  // fan of quads, with a triangle where one is left
+      for (std::size_t first = 1; first + 1 < part.size();
+           first += 2) {  // fan of quads, with a triangle where one is left
         FacePiece piece;
         piece.source = static_cast<int>(f);
         piece.is_quad = first + 2 < part.size();

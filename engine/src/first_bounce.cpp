@@ -9,7 +9,7 @@ namespace transom {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
-constexpr float kFar = 4;       // diameters from which a patch counts as a point: then it errs by about 1 % of its share
+constexpr float kFar = 4;  // diameters from which a patch counts as a point: then it errs by about 1 % of its share
 constexpr float kAdjacent = 3;  // diameters below which an element needs its closed form
 
 struct Connection {
@@ -25,7 +25,8 @@ FirstBounce::FirstBounce(const LightMesh& mesh, const RayScene& rays, const std:
 }
 
 void FirstBounce::add(const BrightElement& bright) {
-  const int slot_index = bright.element / mesh_.elements_per_slot(), element = bright.element % mesh_.elements_per_slot();
+  const int slot_index = bright.element / mesh_.elements_per_slot(),
+            element = bright.element % mesh_.elements_per_slot();
   const Slot slot = mesh_.slot(slot_index);
   const Face& face = mesh_.faces().faces[slot.face];
   const glm::vec3 normal = slot.side == 0 ? face.normal : -face.normal;
@@ -44,9 +45,11 @@ void FirstBounce::add(const BrightElement& bright) {
     const int place = slot.side == 0 ? k : piece.corner_count - 1 - k;
     piece.corner[place] = face.position(mesh_.element_parameters(slot.face, slot.cell, element, local));
   }
-  // In a triangle's grid every second cell is turned; its corners keep their sense, since it is turned by half a circle.
+  // In a triangle's grid every second cell is turned; its corners keep their sense, since it is turned by half a
+  // circle.
   piece.middle = mesh_.lifted_position(
-      slot.face, slot.side, mesh_.element_parameters(slot.face, slot.cell, element, is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3)));
+      slot.face, slot.side,
+      mesh_.element_parameters(slot.face, slot.cell, element, is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3)));
   piece.area = mesh_.element_area(slot.face, slot.cell, element);
   piece.radiosity = bright.radiosity;
   pieces_.push_back(piece);
@@ -89,7 +92,8 @@ glm::vec3 FirstBounce::irradiance(glm::vec3 point, glm::vec3 normal) const {
         if (cosine > 0 && piece_height > 0)
           connect(piece.middle, piece.radiosity * (piece.area * cosine * piece_height / (kPi * d2 * d2)));
       } else {
-        const float share = point_to_polygon(point, normal, {piece.corner, static_cast<std::size_t>(piece.corner_count)});
+        const float share =
+            point_to_polygon(point, normal, {piece.corner, static_cast<std::size_t>(piece.corner_count)});
         if (share > 0) connect(piece.middle, piece.radiosity * share);
       }
     }

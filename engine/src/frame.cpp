@@ -13,11 +13,11 @@ namespace transom {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
-constexpr int kMaximumCrossings = 16;      // openings looked through, one behind another
-constexpr std::size_t kBlock = 64;         // samples traced together
-constexpr float kSameNormal = 0.9995f;     // cosine between normals of one smooth or flat surface
-constexpr int kLargestMask = 4096;         // pixels a side of a stencil mask
-constexpr float kSameShare = 0.02f;        // of a beam, between neighbouring pixels without an edge
+constexpr int kMaximumCrossings = 16;   // openings looked through, one behind another
+constexpr std::size_t kBlock = 64;      // samples traced together
+constexpr float kSameNormal = 0.9995f;  // cosine between normals of one smooth or flat surface
+constexpr int kLargestMask = 4096;      // pixels a side of a stencil mask
+constexpr float kSameShare = 0.02f;     // of a beam, between neighbouring pixels without an edge
 
 }  // namespace
 
@@ -61,7 +61,8 @@ PrimaryHits trace_primary(const SceneGeometry& scene, const View& view) {
     for (std::size_t i = begin; i < end; ++i) {
       const Hit& hit = hits[i - begin];
       result.face[i] = hit.face < 0 ? -1 : faces.faces[hit.face].source;
-      if (hit.face >= 0) result.position[i] = view.position + static_cast<double>(hit.t) * glm::dvec3(rays[i - begin].direction);
+      if (hit.face >= 0)
+        result.position[i] = view.position + static_cast<double>(hit.t) * glm::dvec3(rays[i - begin].direction);
     }
   });
   return result;
@@ -164,7 +165,8 @@ void FrameRenderer::trace_and_shade(const View& view, std::span<Sample> samples,
       }
       share.assign(facing.size(), 0.f);
       if (volumes)
-        for (std::size_t k = 0; k < facing.size(); ++k) share[k] = volumes->share[b][samples[first + facing[k]].mask_index];
+        for (std::size_t k = 0; k < facing.size(); ++k)
+          share[k] = volumes->share[b][samples[first + facing[k]].mask_index];
       else
         engine_.direct_light().beam_transmission(beam.direction_to_source, facing_points, share);
       for (std::size_t k = 0; k < facing.size(); ++k) {
@@ -172,7 +174,8 @@ void FrameRenderer::trace_and_shade(const View& view, std::span<Sample> samples,
         Sample& sample = samples[first + i];
         const float cosine = glm::dot(normals[i], beam.direction_to_source);
         sample.beam_signature += share[k] * (1 + 0.61803f * static_cast<float>(b));
-        sample.sun += through[i] * share[k] * cosine / kPi * engine_.reflectance(sample.face, sample.side) * beam.normal_illuminance;
+        sample.sun += through[i] * share[k] * cosine / kPi * engine_.reflectance(sample.face, sample.side) *
+                      beam.normal_illuminance;
       }
     }
     // What is seen through openings counts as exterior, whatever lit it.
@@ -201,7 +204,8 @@ Frame FrameRenderer::render(const View& view, FrameOptions options) {
   }
   const BeamShare* shares = use_volumes ? &volumes : nullptr;
   const auto mask_index = [&](int x, int y, int i, int j) {
-    const int column = x * mask_scale + (2 * i + 1) * mask_scale / (2 * s), row = y * mask_scale + (2 * j + 1) * mask_scale / (2 * s);
+    const int column = x * mask_scale + (2 * i + 1) * mask_scale / (2 * s),
+              row = y * mask_scale + (2 * j + 1) * mask_scale / (2 * s);
     return row * width * mask_scale + column;
   };
 
@@ -257,12 +261,13 @@ Frame FrameRenderer::render(const View& view, FrameOptions options) {
   frame.width = width;
   frame.height = height;
   frame.edge_pixel_count = static_cast<int>(edges.size());
-  const auto average_into = [&](std::vector<glm::vec3>& picture, glm::vec3 Sample::* component) {
+  const auto average_into = [&](std::vector<glm::vec3>& picture, glm::vec3 Sample::*component) {
     picture.resize(pixel_count);
     for (std::size_t p = 0; p < pixel_count; ++p) picture[p] = centres[p].*component;
     for (std::size_t e = 0; e < edges.size(); ++e) {
       glm::vec3 sum(0);
-      for (int k = 0; k < s * s; ++k) sum += subsamples[e * static_cast<std::size_t>(s * s) + static_cast<std::size_t>(k)].*component;
+      for (int k = 0; k < s * s; ++k)
+        sum += subsamples[e * static_cast<std::size_t>(s * s) + static_cast<std::size_t>(k)].*component;
       picture[edges[e]] = sum / static_cast<float>(s * s);
     }
   };
@@ -277,7 +282,8 @@ Frame FrameRenderer::render(const View& view, FrameOptions options) {
   return frame;
 }
 
-// Share of each beam at each sample: lit or not by the stencil, times the transmittance of the openings that it counted.
+// Share of each beam at each sample: lit or not by the stencil, times the transmittance of the openings that it
+// counted.
 void FrameRenderer::render_volumes(const View& view, int samples_per_axis, std::vector<std::vector<float>>& shares) {
   if (!volumes_) {
     std::vector<glm::vec3> vertices;
@@ -305,13 +311,14 @@ void FrameRenderer::render_volumes(const View& view, int samples_per_axis, std::
     volumes_ = std::make_unique<ShadowVolumes>(*context_, vertices, opaque, openings);
   }
   const glm::dvec3 origin = engine_.faces().origin;
-  const VolumeCamera camera{view.position - origin, view.target - origin, view.up, view.vertical_fov_rad,
-                            view.width * samples_per_axis, view.height * samples_per_axis};
+  const VolumeCamera camera{view.position - origin, view.target - origin,          view.up,
+                            view.vertical_fov_rad,  view.width * samples_per_axis, view.height * samples_per_axis};
   for (const Beam& beam : engine_.lighting().condition.beams) {
     const BeamMask mask = volumes_->render(camera, glm::dvec3(beam.direction_to_source));
     std::vector<float> transmittance;
     for (const VolumeGroup& group : volume_groups_)
-      transmittance.push_back(engine_.scene().openings[group.opening].transmittance_at(glm::dot(group.normal, beam.direction_to_source)));
+      transmittance.push_back(
+          engine_.scene().openings[group.opening].transmittance_at(glm::dot(group.normal, beam.direction_to_source)));
     std::vector<float>& share = shares.emplace_back(mask.shadowed.size());
     parallel_indices(share.size(), 4096, [&](std::size_t i) {
       share[i] = mask.shadowed[i] ? 0.f : 1.f;

@@ -9,9 +9,9 @@
 namespace transom {
 namespace {
 
-constexpr int kBlock = 64;                     // rays traced together
-constexpr double kSmallSolidAngle = 2e-3;      // below it a triangle is sampled by area [sr]
-constexpr int kMinimumRaysPerTriangle = 4;     // towards an opening triangle above the horizon
+constexpr int kBlock = 64;                  // rays traced together
+constexpr double kSmallSolidAngle = 2e-3;   // below it a triangle is sampled by area [sr]
+constexpr int kMinimumRaysPerTriangle = 4;  // towards an opening triangle above the horizon
 constexpr float kPi = std::numbers::pi_v<float>;
 
 }  // namespace
@@ -58,7 +58,8 @@ void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint
       const Origin origin = origin_of(glm::vec2(u.z, u.w));
       rays[i] = {origin.position, frame_from_normal(origin.normal) * sample_cosine_hemisphere({u.x, u.y})};
     }
-    rays_.intersect(RayScene::What::kAll, {rays, static_cast<std::size_t>(size)}, {hits, static_cast<std::size_t>(size)});
+    rays_.intersect(RayScene::What::kAll, {rays, static_cast<std::size_t>(size)},
+                    {hits, static_cast<std::size_t>(size)});
     for (int i = 0; i < size; ++i) {
       if (hits[i].face < 0) {
         ++escaped;
@@ -96,7 +97,8 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
   for (std::size_t k = 0; k < opening_triangles_.size(); ++k) {
     const OpeningTriangle& t = opening_triangles_[k];
     float highest = -1;
-    for (const glm::vec3& corner : t.corner) highest = std::max(highest, glm::dot(corner - middle.position, middle.normal));
+    for (const glm::vec3& corner : t.corner)
+      highest = std::max(highest, glm::dot(corner - middle.position, middle.normal));
     if (highest <= 0) continue;
     importance[k] = triangle_from(t, middle.position).solid_angle() + 1e-9;
     total += importance[k];
@@ -131,7 +133,8 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
         solid_angle = static_cast<float>(seen.solid_angle());
       } else {
         const glm::vec2 b = sample_triangle({u.x, u.y});
-        to_opening = t.corner[0] + b.x * (t.corner[1] - t.corner[0]) + b.y * (t.corner[2] - t.corner[0]) - origin.position;
+        to_opening =
+            t.corner[0] + b.x * (t.corner[1] - t.corner[0]) + b.y * (t.corner[2] - t.corner[0]) - origin.position;
         const float distance2 = glm::dot(to_opening, to_opening);
         if (distance2 == 0) continue;
         solid_angle = t.area * std::abs(glm::dot(to_opening, normal)) / (distance2 * std::sqrt(distance2));
@@ -201,7 +204,8 @@ GatherRow Gatherer::gather_over_patch(int slot_index, GatherSamples samples, std
   GatherRow row;
   gather_hemisphere(origin_of, samples.hemisphere, seed, row);
   const glm::vec2 middle = mesh_.grid(slot.face).is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3);
-  const Origin centre{mesh_.lifted_position(slot.face, slot.side, mesh_.cell_parameters(slot.face, slot.cell, middle)), normal};
+  const Origin centre{mesh_.lifted_position(slot.face, slot.side, mesh_.cell_parameters(slot.face, slot.cell, middle)),
+                      normal};
   gather_openings(centre, origin_of, samples.openings, seed, row);
   merge_shares(row.through);
   merge_shares(row.sky);

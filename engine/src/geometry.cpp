@@ -23,7 +23,9 @@ template <typename... Parts>
   throw InputError(text.str());
 }
 
-bool all_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+bool all_finite(glm::dvec3 v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 
 // Vertices at the same place are one, so that a mesh is closed even where a file repeats its vertices.
 std::vector<int> weld_vertices(const std::vector<glm::dvec3>& vertices, double tolerance) {
@@ -43,7 +45,8 @@ int find_root(std::vector<int>& parent, int i) {
   return i;
 }
 
-// Faces of closed, outward-looking surfaces: every directed edge is met once by its reverse, and the volume is positive.
+// Faces of closed, outward-looking surfaces: every directed edge is met once by its reverse, and the volume is
+// positive.
 void mark_solids(const SceneGeometry& scene, Faces& result) {
   const std::vector<int> welded = weld_vertices(scene.vertices, 1e-7 * result.extent);
   const std::size_t face_count = scene.faces.size();
@@ -64,8 +67,8 @@ void mark_solids(const SceneGeometry& scene, Faces& result) {
     for (int k = 0; k < count; ++k) ++directed_edges[{welded[face[k]], welded[face[(k + 1) % count]]}];
     const glm::dvec3 a = scene.vertices[face[0]] - result.origin;
     for (int k = 2; k < count; ++k)
-      volume[root] += glm::dot(a, glm::cross(scene.vertices[face[k - 1]] - result.origin,
-                                             scene.vertices[face[k]] - result.origin));
+      volume[root] +=
+          glm::dot(a, glm::cross(scene.vertices[face[k - 1]] - result.origin, scene.vertices[face[k]] - result.origin));
   }
   for (const auto& [edge, times] : directed_edges) {
     const auto reverse = directed_edges.find({edge.second, edge.first});
@@ -92,8 +95,10 @@ float OpeningGroup::transmittance_at(float cos_theta) const {
 
 void SceneGeometry::validate() const {
   if (faces.empty()) fail("the scene has no faces");
-  if (face_material.size() != faces.size()) fail("face_material has ", face_material.size(), " rows for ", faces.size(), " faces");
-  if (!corner_normals.empty() && corner_normals.size() != 4 * faces.size()) fail("corner_normals must have four rows a face");
+  if (face_material.size() != faces.size())
+    fail("face_material has ", face_material.size(), " rows for ", faces.size(), " faces");
+  if (!corner_normals.empty() && corner_normals.size() != 4 * faces.size())
+    fail("corner_normals must have four rows a face");
   for (std::size_t i = 0; i < vertices.size(); ++i)
     if (!all_finite(vertices[i])) fail("vertex ", i, " is not finite");
   for (std::size_t f = 0; f < faces.size(); ++f) {
@@ -111,10 +116,12 @@ void SceneGeometry::validate() const {
       if (!(material.luminance[c] >= 0 && std::isfinite(material.luminance[c])))
         fail("material ", m, ": luminance ", material.luminance[c], " is not a finite number of at least 0");
     }
-    if (material.opening >= static_cast<int>(openings.size())) fail("material ", m, " names opening ", material.opening);
+    if (material.opening >= static_cast<int>(openings.size()))
+      fail("material ", m, " names opening ", material.opening);
   }
   for (std::size_t g = 0; g < openings.size(); ++g) {
-    if (openings[g].transmittance.size() < 2) fail("opening ", g, ": the transmittance table needs two entries or more");
+    if (openings[g].transmittance.size() < 2)
+      fail("opening ", g, ": the transmittance table needs two entries or more");
     for (const float t : openings[g].transmittance)
       if (!(t >= 0 && t <= 1)) fail("opening ", g, ": transmittance ", t, " is outside 0..1");
     if (!(openings[g].diffuse_reflectance >= 0 && openings[g].diffuse_reflectance < 1))
@@ -137,9 +144,8 @@ glm::vec2 Face::parameters(int triangle, glm::vec2 b) const {
   if (!is_quad) return b;
   if (is_parallelogram) return triangle == 0 ? glm::vec2(b.x + b.y, b.y) : glm::vec2(b.x, b.x + b.y);
   // Inverse of the bilinear map, in the plane's own axes: p = e + s f + t g + s t h.
-  const glm::vec3 p3 = triangle == 0
-                           ? corner[0] + b.x * (corner[1] - corner[0]) + b.y * (corner[2] - corner[0])
-                           : corner[0] + b.x * (corner[2] - corner[0]) + b.y * (corner[3] - corner[0]);
+  const glm::vec3 p3 = triangle == 0 ? corner[0] + b.x * (corner[1] - corner[0]) + b.y * (corner[2] - corner[0])
+                                     : corner[0] + b.x * (corner[2] - corner[0]) + b.y * (corner[3] - corner[0]);
   const glm::dvec3 x = glm::normalize(glm::dvec3(corner[1] - corner[0])), y = glm::cross(glm::dvec3(normal), x);
   const auto flat = [&](glm::vec3 v) { return glm::dvec2(glm::dot(glm::dvec3(v), x), glm::dot(glm::dvec3(v), y)); };
   const glm::dvec2 e = flat(p3 - corner[0]), f = flat(corner[1] - corner[0]), g = flat(corner[3] - corner[0]);
@@ -194,7 +200,8 @@ Faces make_faces(const SceneGeometry& scene) {
     face.is_parallelogram = face.is_quad && glm::dot(skew, skew) < 1e-10 * area;
     for (int k = 0; k < 4; ++k) {
       face.corner[k] = glm::vec3(corner[k]);
-      const bool is_smooth = scene.materials[face.material].smooth && glm::dot(piece.corner_normal[k], face.normal) > 0.1f;
+      const bool is_smooth =
+          scene.materials[face.material].smooth && glm::dot(piece.corner_normal[k], face.normal) > 0.1f;
       face.corner_normal[k] = is_smooth ? glm::normalize(piece.corner_normal[k]) : face.normal;
     }
   }

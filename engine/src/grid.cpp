@@ -71,9 +71,10 @@ NodeWeights Grid::interpolate(CellPoint point) const {
     return {{triangle_node(cell.i, cell.j), triangle_node(cell.i + 1, cell.j), triangle_node(cell.i, cell.j + 1), 0},
             {first_weight, p.x, p.y, 0},
             3};
-  return {{triangle_node(cell.i + 1, cell.j + 1), triangle_node(cell.i, cell.j + 1), triangle_node(cell.i + 1, cell.j), 0},
-          {first_weight, p.x, p.y, 0},
-          3};
+  return {
+      {triangle_node(cell.i + 1, cell.j + 1), triangle_node(cell.i, cell.j + 1), triangle_node(cell.i + 1, cell.j), 0},
+      {first_weight, p.x, p.y, 0},
+      3};
 }
 
 }  // namespace transom

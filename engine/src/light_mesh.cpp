@@ -79,6 +79,8 @@ glm::vec3 LightMesh::lifted_position(int face, Side side, glm::vec2 st) const {
   return f.position(st) + lift * f.normal;
 }
 
-glm::vec2 LightMesh::sample_local(int face, glm::vec2 u) const { return grid(face).is_quad ? u : sample_triangle(u); }
+glm::vec2 LightMesh::sample_local(int face, glm::vec2 u) const {
+  return grid(face).is_quad ? u : sample_triangle(u);
+}
 
 }  // namespace transom

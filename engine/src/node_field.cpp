@@ -37,7 +37,8 @@ NodeField::NodeField(const LightMesh& mesh, const RayScene& rays, const std::vec
       cell.first = static_cast<int>(nodes_.size());
       const Grid own = own_grid(slot.face, cell.divisions);
       for (int k = 0; k < own.node_count(); ++k)
-        nodes_.push_back(make_node(slot, mesh.cell_parameters(slot.face, slot.cell, own.node_parameters(k)), cell.divisions));
+        nodes_.push_back(
+            make_node(slot, mesh.cell_parameters(slot.face, slot.cell, own.node_parameters(k)), cell.divisions));
       continue;
     }
     int& first = first_of_side[2 * slot.face + slot.side];
@@ -82,7 +83,8 @@ void NodeField::finish(std::vector<char> node_is_exposed) {
       for (int a = 0; a < corners.count; ++a) {
         cell.is_split |= !node_is_exposed_[corners.node[a]];
         const glm::vec3 from = nodes_[corners.node[a]].position;
-        for (int b = a + 1; b < corners.count; ++b) rays[count++] = {from, nodes_[corners.node[b]].position - from, 0, 1};
+        for (int b = a + 1; b < corners.count; ++b)
+          rays[count++] = {from, nodes_[corners.node[b]].position - from, 0, 1};
       }
       rays_.occluded(RayScene::What::kOpaque, {rays, count}, {blocked, count});
       for (std::size_t k = 0; k < count; ++k) cell.is_split |= blocked[k];
@@ -99,7 +101,8 @@ NodeShares NodeField::interpolate(int face, Side side, glm::vec2 st, glm::vec3 l
   Ray rays[4];
   std::uint8_t blocked[4];
   const auto count = static_cast<std::size_t>(shares.count);
-  for (std::size_t k = 0; k < count; ++k) rays[k] = {lifted_point, nodes_[shares.node[k]].position - lifted_point, 0, 1};
+  for (std::size_t k = 0; k < count; ++k)
+    rays[k] = {lifted_point, nodes_[shares.node[k]].position - lifted_point, 0, 1};
   rays_.occluded(RayScene::What::kOpaque, {rays, count}, {blocked, count});
   float sum = 0;
   for (std::size_t k = 0; k < count; ++k) {

@@ -32,8 +32,12 @@ RTCDevice shared_device() {
 
 // Embree 3 takes a context, Embree 4 optional arguments.
 #if TRANSOM_EMBREE_MAJOR >= 4
-void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays) { rtcIntersect16(valid, scene, rays, nullptr); }
-void occluded16(const int* valid, RTCScene scene, RTCRay16* rays) { rtcOccluded16(valid, scene, rays, nullptr); }
+void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays) {
+  rtcIntersect16(valid, scene, rays, nullptr);
+}
+void occluded16(const int* valid, RTCScene scene, RTCRay16* rays) {
+  rtcOccluded16(valid, scene, rays, nullptr);
+}
 #else
 void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays) {
   RTCIntersectContext context;
@@ -168,7 +172,8 @@ float RayScene::transmittance(const Ray& ray) const {
     intersect(What::kOpenings, {&rest, 1}, {&hit, 1});
     if (hit.face < 0) return product;
     const Face& face = faces_.faces[static_cast<std::size_t>(hit.face)];
-    const OpeningGroup& group = openings_[static_cast<std::size_t>(materials_[static_cast<std::size_t>(face.material)].opening)];
+    const OpeningGroup& group =
+        openings_[static_cast<std::size_t>(materials_[static_cast<std::size_t>(face.material)].opening)];
     product *= group.transmittance_at(glm::dot(face.normal, ray.direction) / length);
     rest.t_near = hit.t * (1 + 4e-6f) + 0.1f * faces_.ray_offset() / length;
   }

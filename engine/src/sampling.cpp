@@ -16,8 +16,8 @@ struct Polynomial {
 };
 
 // Joe & Kuo 2008, "new-joe-kuo-6": dimensions 2 to 4. Dimension 1 is van der Corput's sequence.
-constexpr std::array<Polynomial, kDimensions - 1> kPolynomials{
-    Polynomial{1, 0, {1, 0, 0}}, Polynomial{2, 1, {1, 3, 0}}, Polynomial{3, 1, {1, 3, 1}}};
+constexpr std::array<Polynomial, kDimensions - 1> kPolynomials{Polynomial{1, 0, {1, 0, 0}}, Polynomial{2, 1, {1, 3, 0}},
+                                                               Polynomial{3, 1, {1, 3, 1}}};
 
 constexpr auto make_directions() {
   std::array<std::array<std::uint32_t, 32>, kDimensions> directions{};
@@ -128,7 +128,9 @@ glm::vec2 sample_triangle(glm::vec2 u) {
 SphericalTriangle::SphericalTriangle(glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) : a_(a), b_(b), c_(c) {
   const glm::dvec3 ab = glm::cross(a, b), bc = glm::cross(b, c), ca = glm::cross(c, a);
   if (glm::dot(ab, ab) == 0 || glm::dot(bc, bc) == 0 || glm::dot(ca, ca) == 0) return;
-  const auto angle = [](glm::dvec3 u, glm::dvec3 v) { return std::atan2(glm::length(glm::cross(u, v)), glm::dot(u, v)); };
+  const auto angle = [](glm::dvec3 u, glm::dvec3 v) {
+    return std::atan2(glm::length(glm::cross(u, v)), glm::dot(u, v));
+  };
   alpha_ = angle(ab, -ca);
   const double beta = angle(bc, -ab), gamma = angle(ca, -bc);
   solid_angle_ = std::max(0.0, alpha_ + beta + gamma - std::numbers::pi);

@@ -10,9 +10,9 @@ namespace transom {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
-constexpr int kRaysPerSource = 256;        // from each face or point that light starts at
-constexpr int kReflections = 6;            // followed to find what lies indoors
-constexpr float kHollowShare = 0.25f;      // of a source's rays on the inside of a solid: then it is a room
+constexpr int kRaysPerSource = 256;         // from each face or point that light starts at
+constexpr int kReflections = 6;             // followed to find what lies indoors
+constexpr float kHollowShare = 0.25f;       // of a source's rays on the inside of a solid: then it is a room
 constexpr double kOutdoorPatchCount = 400;  // at most about so many patches outdoors
 
 glm::vec3 sample_sphere(glm::vec2 u) {
@@ -96,7 +96,8 @@ class Surveyor {
         if (scene_.materials[faces_.faces[hit.face].material].opening >= 0) continue;
         is_indoors_[hit.face] = 1;
         Ray next;
-        next.origin = leave(faces_, hit.face, hit.side, hit.st, points.point2(static_cast<std::uint32_t>(i)), next.direction);
+        next.origin =
+            leave(faces_, hit.face, hit.side, hit.st, points.point2(static_cast<std::uint32_t>(i)), next.direction);
         rays_[kept++] = next;
       }
       rays_.resize(kept);
@@ -109,7 +110,8 @@ class Surveyor {
     for (const Hit& hit : hits_)
       if (hit.face >= 0 && faces_.is_inside_solid(hit.face, hit.side)) ++count[faces_.faces[hit.face].component];
     for (std::size_t c = 0; c < count.size(); ++c)
-      if (static_cast<float>(count[c]) > kHollowShare * static_cast<float>(hits_.size())) faces_.component_is_solid[c] = 0;
+      if (static_cast<float>(count[c]) > kHollowShare * static_cast<float>(hits_.size()))
+        faces_.component_is_solid[c] = 0;
   }
 
   const SceneGeometry& scene_;
@@ -139,7 +141,8 @@ std::vector<float> choose_edges(const Faces& faces, const std::vector<char>& is_
   const double edge = maximum_edge > 0 ? maximum_edge : std::sqrt(indoors / target_patch_count);
   const double outdoor_edge = std::max(edge, std::sqrt(outdoors / kOutdoorPatchCount));
   std::vector<float> edges;
-  for (const char indoor : is_indoors) edges.push_back(static_cast<float>(indoor || indoors == 0 ? edge : outdoor_edge));
+  for (const char indoor : is_indoors)
+    edges.push_back(static_cast<float>(indoor || indoors == 0 ? edge : outdoor_edge));
   return edges;
 }
 

@@ -7,13 +7,13 @@
 namespace transom {
 namespace {
 
-// A trace of exchange of each patch with itself. It makes the scaling possible for every scene (the matrix then has total
-// support), and takes up what a patch in a gap cannot give to others.
+// A trace of exchange of each patch with itself. It makes the scaling possible for every scene (the matrix then has
+// total support), and takes up what a patch in a gap cannot give to others.
 constexpr float kSelfShare = 1e-5f;
 
 constexpr int kMaximumScalings = 100;
 constexpr double kRowSumTolerance = 1e-7;
-constexpr double kLargestStep = 1.0;         // of a logarithm of a scale
+constexpr double kLargestStep = 1.0;  // of a logarithm of a scale
 constexpr int kMaximumGradientSteps = 300;
 constexpr double kGradientTolerance = 1e-3;  // relative: Newton's method needs no more
 
@@ -31,8 +31,8 @@ SparseRows transpose(const SparseRows& rows) {
   return result;
 }
 
-// One A_i F_ij for every pair that either patch has seen. With equal numbers of rays a patch, the variance of its estimate
-// is in proportion to its area: the smaller patch, whose rays are denser, has the larger say.
+// One A_i F_ij for every pair that either patch has seen. With equal numbers of rays a patch, the variance of its
+// estimate is in proportion to its area: the smaller patch, whose rays are denser, has the larger say.
 SparseRows average_both_ways(const SparseRows& exchange, const std::vector<float>& areas, double& defect) {
   const SparseRows reverse = transpose(exchange);
   SparseRows result;
@@ -44,7 +44,8 @@ SparseRows average_both_ways(const SparseRows& exchange, const std::vector<float
     std::size_t a = exchange.begin[i], b = reverse.begin[i];
     while (a < exchange.begin[i + 1] || b < reverse.begin[i + 1]) {
       const bool has_a = a < exchange.begin[i + 1], has_b = b < reverse.begin[i + 1];
-      const int index = std::min(has_a ? exchange.entries[a].index : INT32_MAX, has_b ? reverse.entries[b].index : INT32_MAX);
+      const int index =
+          std::min(has_a ? exchange.entries[a].index : INT32_MAX, has_b ? reverse.entries[b].index : INT32_MAX);
       const float forth = has_a && exchange.entries[a].index == index ? exchange.entries[a++].weight : 0;
       const float back = has_b && reverse.entries[b].index == index ? reverse.entries[b++].weight : 0;
       difference += std::abs(static_cast<double>(forth) - back);
@@ -65,8 +66,8 @@ SparseRows average_both_ways(const SparseRows& exchange, const std::vector<float
 
 // Conjugate gradients with the diagonal as preconditioner, for a positive (semi-)definite operator.
 template <typename Operator>
-void solve_positive_definite(const Operator& apply, const std::vector<double>& diagonal, const std::vector<double>& right,
-                             std::vector<double>& x) {
+void solve_positive_definite(const Operator& apply, const std::vector<double>& diagonal,
+                             const std::vector<double>& right, std::vector<double>& x) {
   const std::size_t n = right.size();
   std::vector<double> r = right, z(n), p(n), q(n);
   std::fill(x.begin(), x.end(), 0.0);
@@ -104,7 +105,8 @@ TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<floa
   TransferDefects defects;
   const std::size_t n = form_factors.row_count();
   for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t k = form_factors.begin[i]; k < form_factors.begin[i + 1]; ++k) form_factors.entries[k].weight *= areas[i];
+    for (std::size_t k = form_factors.begin[i]; k < form_factors.begin[i + 1]; ++k)
+      form_factors.entries[k].weight *= areas[i];
   const SparseRows exchange = average_both_ways(form_factors, areas, defects.raw_reciprocity);
 
   std::vector<double> scale(n, 1.0), sum(n, 0.0), residual(n), step(n);

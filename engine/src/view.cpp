@@ -11,8 +11,8 @@ namespace transom {
 void View::validate() const {
   constexpr int kMaximumSize = 16384;
   if (width < 1 || height < 1 || width > kMaximumSize || height > kMaximumSize)
-    throw InputError("the picture's size " + std::to_string(width) + " x " + std::to_string(height) + " is outside 1.." +
-                     std::to_string(kMaximumSize));
+    throw InputError("the picture's size " + std::to_string(width) + " x " + std::to_string(height) +
+                     " is outside 1.." + std::to_string(kMaximumSize));
   if (!(vertical_fov_rad > 0 && vertical_fov_rad < std::numbers::pi))
     throw InputError("the vertical field of view is outside 0..180 degrees");
   const glm::dvec3 forward = target - position;
@@ -29,7 +29,8 @@ CameraRays::CameraRays(const View& view) : width_(view.width), height_(view.heig
 }
 
 glm::vec3 CameraRays::direction(glm::vec2 pixel) const {
-  return glm::vec3(glm::normalize(forward_ + (2.0 * pixel.x / width_ - 1.0) * right_ + (2.0 * pixel.y / height_ - 1.0) * down_));
+  return glm::vec3(
+      glm::normalize(forward_ + (2.0 * pixel.x / width_ - 1.0) * right_ + (2.0 * pixel.y / height_ - 1.0) * down_));
 }
 
 }  // namespace transom

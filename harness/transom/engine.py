@@ -32,9 +32,10 @@ class SolveOptions:
     """Settings of a solve; the defaults serve every scene.
 
     maximum_edge_m: of a patch [m]; 0 chooses it from target_patch_count. elements_per_edge: a patch has its square.
-    patch_rays, patch_opening_rays: rays a patch, over the hemisphere and towards the openings; node_*: the same for each
-    point at which light is shown (a node). node_spacing: of nodes, against the harmonic mean distance of what their cell
-    sees: smaller values put more nodes into corners and under furniture. tolerance: relative flux in flight at which interreflection stops. seed: of all samples.
+    patch_rays, patch_opening_rays: rays a patch, over the hemisphere and towards the openings; node_*: the same for
+    each point at which light is shown (a node). node_spacing: of nodes, against the harmonic mean distance of what
+    their cell sees: smaller values put more nodes into corners and under furniture. tolerance: relative flux in flight
+    at which interreflection stops. seed: of all samples.
     """
 
     maximum_edge_m: float = 0.0
@@ -88,7 +89,7 @@ class Engine:
 
     @classmethod
     def solve(cls, scene: Scene, options: SolveOptions | None = None, *, trace: bool = False) -> Self:
-        """Everything that depends on geometry and reflectance alone. Raises InputError for a room that is not closed."""
+        """All that depends on geometry and reflectance alone. Raises InputError for a room that is not closed."""
         options = options or SolveOptions()
         sky_bins = SkyBins(SKY_SUBDIVISION)
         try:
@@ -148,10 +149,11 @@ class Engine:
     def audit(self, rays_per_opening: int = 65536) -> EnergyAudit:
         """Flux balance of the rooms; what enters is sampled from the openings with rays of its own."""
         self._require_light()
-        return EnergyAudit(**{name: np.array(value) for name, value in self._core.audit(rays_per_opening).items()})
+        parts = self._core.audit(rays_per_opening)
+        return EnergyAudit(**{name: np.array(value) for name, value in parts.items()})
 
     def facts(self) -> dict[str, Any]:
-        """What the solve found and did: counts, the edge chosen, leaks, and how far form factors were off before mending."""
+        """What the solve found and did: counts, the edge chosen, leaks, and how far form factors were off at first."""
         facts, defects = self._core.facts, self._core.facts.defects
         return {
             "faces": facts.face_count,
@@ -248,4 +250,5 @@ def _with_object_names(text: str, scene: Scene) -> str:
         return text
     face = int(words[1].split(",")[0].split(" ")[0].strip("."))
     material = scene.materials[int(scene.mesh.face_material[face])].name
-    return f"{text} (face {face} belongs to object {scene.mesh.objects[scene.mesh.face_object[face]]!r}, material {material!r})"
+    owner = scene.mesh.objects[scene.mesh.face_object[face]]
+    return f"{text} (face {face} belongs to object {owner!r}, material {material!r})"

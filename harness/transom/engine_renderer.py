@@ -40,7 +40,7 @@ class EngineRenderer:
         progress: Progress | None = None,
     ) -> ImageResult:
         options = {**self.default_options(), **options}
-        report = progress or (lambda done, total: None)
+        report = progress or _no_progress
         engine, facts = self._relit(scene, condition, options, report)
         begin = time.perf_counter()
         frame = engine.render(view, options["visibility"], edge_samples=options["edge_samples"])
@@ -59,7 +59,7 @@ class EngineRenderer:
         progress: Progress | None = None,
     ) -> SensorResult:
         options = {**self.default_options(), **options}
-        report = progress or (lambda done, total: None)
+        report = progress or _no_progress
         engine, facts = self._relit(scene, condition, options, report)
         begin = time.perf_counter()
         parts = engine.illuminance(
@@ -97,3 +97,7 @@ class EngineRenderer:
             "trace": engine.trace(),
         }
         return engine, facts
+
+
+def _no_progress(done: int, total: int) -> None:
+    """Takes the place of a progress bar that nobody asked for."""

@@ -27,8 +27,8 @@ from transom.files import write_atomic
 from transom.judge import Missing, Outcome, Verdict, exit_code, judge, read_tolerances
 from transom.known_answers import compare_known_answer
 from transom.progress import CaseProgress
-from transom.renderer import Renderer, load_renderer
-from transom.run import Question, coarse_options, engine_questions, render_case
+from transom.renderer import ImageResult, Renderer, load_renderer
+from transom.run import COARSE_VISIBILITY, Question, coarse_options, engine_questions, render_case
 from transom.scene import scene_root
 from transom.scene.model import View
 from transom.sensor_file import SensorTable, scene_sensors
@@ -210,16 +210,19 @@ def _compare_view(
             found.missing.append(Missing(Outcome.CRASHED, scene.name, view.name, condition.name, visibility, message))
             continue
         rendered[visibility] = ours
+    pictures = {visibility: bundle.image() for visibility, bundle in rendered.items()}
     if truth is not None and rendered:
         masks = region_masks(scene, view)
         reference = truth.image()
         coarse = _coarse(entry, engine, view=view)
-        rough = None if coarse is None else coarse.image()
         for visibility, bundle in rendered.items():
             names = _names(entry, view.name, visibility, bundle, truth)
-            found.images += compare_images(bundle.image(), reference, masks, names, rough)
-    if len(rendered) == len(VISIBILITIES):
-        pair = [rendered[visibility].image() for visibility in VISIBILITIES]
+            rough = None
+            if coarse is not None and COARSE_VISIBILITY in pictures:
+                rough = change_of_method(coarse.image(), pictures[COARSE_VISIBILITY], pictures[visibility])
+            found.images += compare_images(pictures[visibility], reference, masks, names, rough)
+    if len(pictures) == len(VISIBILITIES):
+        pair = [pictures[visibility] for visibility in VISIBILITIES]
         found.agreements.append(compare_methods(scene.name, view.name, condition.name, pair[0], pair[1]))
 
 
@@ -240,6 +243,12 @@ def _compare_sensors(
         coarse = _coarse(entry, engine, sensors=table)
         rough = None if coarse is None else coarse.sensors()
         found.sensors += compare_sensors(ours.sensors(), truth.sensors(), names, rough)
+
+
+def change_of_method(coarse: ImageResult, usual: ImageResult, ours: ImageResult) -> ImageResult:
+    """What the coarse solve would show by our visibility method: fewer patches change the picture as they change the
+    usual one by the coarse one's method."""
+    return ImageResult(coarse.mean - usual.mean + ours.mean)
 
 
 def _coarse(

@@ -40,7 +40,8 @@ TEST(Engine, SkyThroughARoofLightMatchesTheClosedForm) {
 }
 
 TEST(Engine, GlassTakesItsShareOnce) {
-  Engine clear(roof_light_room(0), tregenza(), small_options()), tinted(roof_light_room(0, 0.5f), tregenza(), small_options());
+  Engine clear(roof_light_room(0), tregenza(), small_options()),
+      tinted(roof_light_room(0, 0.5f), tregenza(), small_options());
   clear.relight(uniform_sky(1000));
   tinted.relight(uniform_sky(1000));
   const auto a = clear.illuminance({{1, 2, 0}}, {{0, 0, 1}}, kSensorSamples);
@@ -59,7 +60,8 @@ TEST(Engine, FluxInIsFluxAbsorbedAndOut) {
 }
 
 TEST(Engine, RelightingIsTheSameAsSolvingAfresh) {
-  Engine engine(roof_light_room(0.5f), tregenza(), small_options()), fresh(roof_light_room(0.5f), tregenza(), small_options());
+  Engine engine(roof_light_room(0.5f), tregenza(), small_options()),
+      fresh(roof_light_room(0.5f), tregenza(), small_options());
   Condition sunny = uniform_sky(3000);
   sunny.beams.push_back({glm::normalize(glm::vec3(0.3f, 0.1f, 1)), glm::vec3(60000)});
   engine.relight(sunny);

@@ -9,7 +9,9 @@ namespace {
 
 const Grid kGrids[]{{true, 1, 1}, {true, 3, 5}, {false, 1, 1}, {false, 4, 4}};
 
-glm::vec2 point_on(const Grid& grid, glm::vec2 u) { return grid.is_quad ? u : sample_triangle(u); }
+glm::vec2 point_on(const Grid& grid, glm::vec2 u) {
+  return grid.is_quad ? u : sample_triangle(u);
+}
 
 TEST(Grid, LocateAndParametersAreInverse) {
   const SobolSequence points(1);

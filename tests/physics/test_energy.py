@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from conftest import KNOWN, ROOMS, solved
 
 
@@ -22,7 +21,9 @@ def test_form_factors_are_reciprocal_and_their_rows_sum_to_one(name: str) -> Non
     assert pairs
     assert max(abs(forth - back) / scale for forth, back, scale in pairs) < 1e-5
     assert facts["form_factor_defects"]["reciprocity"] < 1e-5
-    assert facts["form_factor_defects"]["raw_reciprocity"] > 0, "sampled form factors cannot be reciprocal by themselves"
+    assert facts["form_factor_defects"]["raw_reciprocity"] > 0, (
+        "sampled form factors cannot be reciprocal by themselves"
+    )
 
 
 @pytest.mark.parametrize("name", ROOMS + KNOWN)

@@ -6,8 +6,8 @@ import importlib
 
 import numpy as np
 import pytest
-
 from conftest import KNOWN, solved
+
 from transom.colour import luminance
 from transom.engine import Engine
 from transom.scene import load_scene
@@ -16,7 +16,7 @@ TOLERANCE = {"cube": 0.01, "furnace": 0.001, "three_tone": 0.005}
 MEAN_OF_CUBE = 0.002
 
 FACE_POINTS = {(0.0, 0.0): 892.8, (0.5, 0.0): 768.7, (0.5, 0.5): 686.7}
-"""Luminance [cd/m²] of CUBE's faces at (x, y) in -1..1  [Khodulev & Kopylov 1996; collocation with analytic factors]."""
+"""Luminance [cd/m²] of CUBE's faces at (x, y) in -1..1  [Khodulev & Kopylov 1996; collocation]."""
 
 
 def face_luminance(engine: Engine, points: list[tuple[float, float]]) -> np.ndarray:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import ROOMS, solved
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from conftest import ROOMS, solved
 from transom.colour import luminance
 from transom.engine import Engine
 from transom.scene.model import View
@@ -16,7 +16,7 @@ from transom.scene.model import View
 WIDTH = 320
 RELATIVE = 0.01
 DISAGREEING_SHARE = 1e-4
-"""Isolated pixels where the rasteriser's depth and a ray's distance fall on two sides of a sliver; see shadow_volumes.h."""
+"""Isolated pixels: the rasteriser's depth and a ray's distance on two sides of a sliver (shadow_volumes.h)."""
 
 
 def sun_pictures(engine: Engine, view: View) -> tuple[np.ndarray, np.ndarray]:

@@ -23,10 +23,12 @@ class DirectLight {
 
   /// Mean direct illuminance of the elements of `slots` that receive any. Stratified over each element; a patch that is
   /// partly lit is sampled again `refinement` times as densely.
-  std::vector<LitElement> deposit(const std::vector<Beam>& beams, const std::vector<int>& slots, std::uint32_t seed) const;
+  std::vector<LitElement> deposit(const std::vector<Beam>& beams, const std::vector<int>& slots,
+                                  std::uint32_t seed) const;
 
   /// Share of a beam that arrives at lifted points: 0 where something opaque intervenes, else the transmittance.
-  void beam_transmission(glm::vec3 direction_to_source, std::span<const glm::vec3> points, std::span<float> share) const;
+  void beam_transmission(glm::vec3 direction_to_source, std::span<const glm::vec3> points,
+                         std::span<float> share) const;
 
   /// Direct illuminance at a lifted point with a shading normal [lx].
   glm::vec3 illuminance(const std::vector<Beam>& beams, glm::vec3 point, glm::vec3 normal) const;

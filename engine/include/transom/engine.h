@@ -21,13 +21,13 @@ namespace transom {
 
 /// Settings of a solve. The defaults serve every scene.
 struct SolveOptions {
-  float maximum_edge_m = 0;      ///< of a patch; 0: from the target number of patches
-  int target_patch_count = 3000; ///< sides of cells that take part in the exchange of light, about
-  int elements_per_edge = 4;     ///< a patch has the square of it
+  float maximum_edge_m = 0;       ///< of a patch; 0: from the target number of patches
+  int target_patch_count = 3000;  ///< sides of cells that take part in the exchange of light, about
+  int elements_per_edge = 4;      ///< a patch has the square of it
   GatherSamples patch_samples{512, 128};
   GatherSamples node_samples{1024, 256};
-  float node_spacing = 6;        ///< of nodes, against the harmonic mean distance of what a cell sees
-  double tolerance = 1e-6;       ///< flux in flight at which interreflection stops, relative
+  float node_spacing = 6;   ///< of nodes, against the harmonic mean distance of what a cell sees
+  double tolerance = 1e-6;  ///< flux in flight at which interreflection stops, relative
   std::uint32_t seed = 1;
   bool trace = false;
 };
@@ -40,15 +40,15 @@ struct SolveFacts {
   TransferDefects defects;
 };
 
-/// Flux balance of the interior [lm], linear RGB. Interior: every side that light from the rooms' side of the openings, or
-/// from emitters, reaches without passing an opening.
+/// Flux balance of the interior [lm], linear RGB. Interior: every side that light from the rooms' side of the openings,
+/// or from emitters, reaches without passing an opening.
 struct EnergyAudit {
-  glm::dvec3 in_sky{0};       ///< sky and ground light through the openings, sampled from the openings
-  glm::dvec3 in_beams{0};     ///< the same for beams
-  glm::dvec3 in_reflected{0}; ///< light that outdoor surfaces send through the openings
-  glm::dvec3 in_emitted{0};   ///< emitting surfaces and point sources
-  glm::dvec3 absorbed{0};     ///< by opaque surfaces
-  glm::dvec3 out{0};          ///< into the room side of openings: transmitted or absorbed there
+  glm::dvec3 in_sky{0};        ///< sky and ground light through the openings, sampled from the openings
+  glm::dvec3 in_beams{0};      ///< the same for beams
+  glm::dvec3 in_reflected{0};  ///< light that outdoor surfaces send through the openings
+  glm::dvec3 in_emitted{0};    ///< emitting surfaces and point sources
+  glm::dvec3 absorbed{0};      ///< by opaque surfaces
+  glm::dvec3 out{0};           ///< into the room side of openings: transmitted or absorbed there
   glm::dvec3 in() const { return in_sky + in_beams + in_reflected + in_emitted; }
 };
 
@@ -62,17 +62,17 @@ struct Irradiance {
 /// Light of the present condition.
 struct Lighting {
   Condition condition;
-  std::vector<glm::vec3> node_sky, node_indirect;       ///< irradiance of each node [lx]
-  std::vector<glm::vec3> patch_irradiance;              ///< all light [lx]
-  std::vector<glm::vec3> patch_smooth_radiosity;        ///< what nodes find by rays: M + rho (E - direct) [lm/m²]
-  std::vector<glm::vec3> element_direct;                ///< patch * elements_per_slot + element [lx]
+  std::vector<glm::vec3> node_sky, node_indirect;  ///< irradiance of each node [lx]
+  std::vector<glm::vec3> patch_irradiance;         ///< all light [lx]
+  std::vector<glm::vec3> patch_smooth_radiosity;   ///< what nodes find by rays: M + rho (E - direct) [lm/m²]
+  std::vector<glm::vec3> element_direct;           ///< patch * elements_per_slot + element [lx]
   int sweeps = 0;
 };
 
 class Engine {
  public:
-  /// Solves: everything that depends on geometry and reflectance alone. Throws InputError for a scene that cannot be lit
-  /// rightly, such as a room whose wall is open.
+  /// Solves: everything that depends on geometry and reflectance alone. Throws InputError for a scene that cannot be
+  /// lit rightly, such as a room whose wall is open.
   Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions options);
   ~Engine();
 
@@ -134,7 +134,7 @@ class Engine {
   // Patches: the slots that take part.
   std::vector<int> patch_of_slot_;  // -1: takes no part
   std::vector<int> slot_of_patch_;
-  std::vector<float> patch_area_;   // exposed part [m²]
+  std::vector<float> patch_area_;  // exposed part [m²]
   std::vector<glm::vec3> patch_reflectance_, patch_emitted_;
   std::vector<char> is_interior_;
   bool connects_emitters_ = false;  // small emitters: found by connection, not by rays

@@ -34,8 +34,8 @@ struct Frame {
 
 /// What pixel centres look at.
 struct PrimaryHits {
-  std::vector<int> face;              ///< first face, openings included; -1: nothing
-  std::vector<glm::dvec3> position;   ///< world [m]
+  std::vector<int> face;             ///< first face, openings included; -1: nothing
+  std::vector<glm::dvec3> position;  ///< world [m]
 };
 
 /// Traces a ray through every pixel centre. Needs no solve.
@@ -44,7 +44,8 @@ PrimaryHits trace_primary(const SceneGeometry& scene, const View& view);
 class ShadowVolumes;
 class GlContext;
 
-/// Renders the present lighting of an engine. Holds the GL context of the stencil method, made on first use; one thread.
+/// Renders the present lighting of an engine. Holds the GL context of the stencil method, made on first use; one
+/// thread.
 class FrameRenderer {
  public:
   explicit FrameRenderer(Engine& engine);

@@ -25,18 +25,18 @@ struct Share {
 
 /// The light of one receiver as weights. Illuminance E = sum reached B + sum through B + sum sky L.
 struct GatherRow {
-  std::vector<Share> reached;  ///< elements seen without looking through an opening: form factors
-  std::vector<Share> through;  ///< elements seen through openings: form factors x transmittance
-  std::vector<Share> sky;      ///< sky bins (and ground): illuminance per luminance [lx per cd/m²]
-  float escaped = 0;           ///< share of the hemisphere that meets nothing: open sky
-  float exposure = 1;          ///< share of the receiver that does not lie inside a solid
-  float harmonic_distance = 0; ///< harmonic mean distance of what is seen [m]
+  std::vector<Share> reached;   ///< elements seen without looking through an opening: form factors
+  std::vector<Share> through;   ///< elements seen through openings: form factors x transmittance
+  std::vector<Share> sky;       ///< sky bins (and ground): illuminance per luminance [lx per cd/m²]
+  float escaped = 0;            ///< share of the hemisphere that meets nothing: open sky
+  float exposure = 1;           ///< share of the receiver that does not lie inside a solid
+  float harmonic_distance = 0;  ///< harmonic mean distance of what is seen [m]
 };
 
 /// Samples the surroundings of receivers. The row of a receiver depends on its seed alone.
 ///
-/// Hemisphere: cosine-distributed rays to the first surface, opening or not. An opening's own reflection is thus part of
-/// `reached`. What is seen through the openings is sampled on the openings: solid-angle sampling of their triangles
+/// Hemisphere: cosine-distributed rays to the first surface, opening or not. An opening's own reflection is thus part
+/// of `reached`. What is seen through the openings is sampled on the openings: solid-angle sampling of their triangles
 /// [Arvo 1995], each ray continued outdoors to an obstruction, the sky or the ground, times the transmittance of all
 /// openings on its way. A ray that meets another opening first is left to that opening.
 class Gatherer {

@@ -84,7 +84,8 @@ struct Faces {
   float ray_offset() const { return 1e-5f * extent; }
 };
 
-/// Recentres the scene in double precision, cuts faces at openings and walls, then finds normals, areas and closed solids.
+/// Recentres the scene in double precision, cuts faces at openings and walls, then finds normals, areas and closed
+/// solids.
 Faces make_faces(const SceneGeometry& scene);
 
 }  // namespace transom

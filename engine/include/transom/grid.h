@@ -1,4 +1,5 @@
-/// @file A regular grid on a quad or a triangle: its cells carry patches or elements, its nodes carry interpolated light.
+/// @file A regular grid on a quad or a triangle: its cells carry patches or elements, its nodes carry interpolated
+/// light.
 #pragma once
 
 #include <array>
@@ -27,9 +28,7 @@ struct Grid {
   int v_count = 1;
 
   int cell_count() const { return is_quad ? u_count * v_count : u_count * u_count; }
-  int node_count() const {
-    return is_quad ? (u_count + 1) * (v_count + 1) : (u_count + 1) * (u_count + 2) / 2;
-  }
+  int node_count() const { return is_quad ? (u_count + 1) * (v_count + 1) : (u_count + 1) * (u_count + 2) / 2; }
 
   /// The cell that holds the parameters `st` (clamped to the face).
   CellPoint locate(glm::vec2 st) const;

@@ -17,13 +17,14 @@ struct NodeShares {
   int count = 0;
 };
 
-/// Nodes at the corners of cells; a cell where light changes within its own size is divided once more and has nodes of its
-/// own. Where something stands between the nodes of a cell, a point asks which of them it sees, so that light does not
-/// leak through walls and partitions.
+/// Nodes at the corners of cells; a cell where light changes within its own size is divided once more and has nodes of
+/// its own. Where something stands between the nodes of a cell, a point asks which of them it sees, so that light does
+/// not leak through walls and partitions.
 class NodeField {
  public:
   /// slots: the cells that need nodes. divisions: of each, 1 (none) or more per edge.
-  NodeField(const LightMesh& mesh, const RayScene& rays, const std::vector<int>& slots, const std::vector<int>& divisions);
+  NodeField(const LightMesh& mesh, const RayScene& rays, const std::vector<int>& slots,
+            const std::vector<int>& divisions);
 
   const std::vector<Node>& nodes() const { return nodes_; }
 

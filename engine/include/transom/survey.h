@@ -11,9 +11,9 @@ namespace transom {
 
 /// Follows random rays from where light enters or starts: the room sides of openings, emitters, point sources.
 ///
-/// A closed surface that light starts inside of is a room, whatever way its faces look: its component is opened in `faces`.
-/// Returns for each face whether such rays, reflected a few times and never passing an opening, have met it: the faces
-/// indoors. Every random number comes from `seed`.
+/// A closed surface that light starts inside of is a room, whatever way its faces look: its component is opened in
+/// `faces`. Returns for each face whether such rays, reflected a few times and never passing an opening, have met it:
+/// the faces indoors. Every random number comes from `seed`.
 std::vector<char> survey_interior(const SceneGeometry& scene, const RayScene& rays, Faces& faces, std::uint32_t seed);
 
 /// Longest edge of patches for each face [m]: `maximum_edge` indoors, or the one that gives about `target_patch_count`

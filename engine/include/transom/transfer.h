@@ -38,8 +38,9 @@ struct TransferDefects {
 
 /// Makes sampled form factors obey A_i F_ij = A_j F_ji and sum_j F_ij = target_i.
 ///
-/// Both estimates of A_i F_ij are averaged by the inverse of their variance, then scaled symmetrically, d_i S_ij d_j, until the row sums hold
-/// [matrix balancing after Sinkhorn & Knopp 1967, by Newton's method: Knight & Ruiz 2013]. Rows without entries stay empty.
+/// Both estimates of A_i F_ij are averaged by the inverse of their variance, then scaled symmetrically, d_i S_ij d_j,
+/// until the row sums hold [matrix balancing after Sinkhorn & Knopp 1967, by Newton's method: Knight & Ruiz 2013]. Rows
+/// without entries stay empty.
 TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<float>& areas,
                                 const std::vector<float>& row_sums);
 
