@@ -392,6 +392,8 @@ Irradiance Engine::interpolate(int face, Side side, glm::vec2 st, glm::vec3 lift
     result.sky += shares.weight[k] * lighting_.node_sky[shares.node[k]];
     result.indirect += shares.weight[k] * lighting_.node_indirect[shares.node[k]];
   }
+  result.sky = glm::max(result.sky, glm::vec3(0));
+  result.indirect = glm::max(result.indirect, glm::vec3(0));
   return result;
 }
 

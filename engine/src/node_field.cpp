@@ -7,13 +7,23 @@
 namespace transom {
 namespace {
 
-constexpr float kInset = 0.02f;  // of a cell: keeps nodes out of the surfaces that meet the face at its edges
+// Nodes at the border of a face stand back from it by this share of their cell. At an inner corner irradiance falls or
+// rises steeply in the last centimetres; a node there would speak for half of its cell.
+constexpr float kInset = 0.15f;
+constexpr float kTriangleInset = 0.02f;
 constexpr float kLeastWeight = 1e-3f;
 
-// Moves parameters off the border of the face by `inset` of a cell that spans `cell_size` of the parameters.
+// Parameters of a node, off the border of the face by the inset of a cell that spans `cell_size` of the parameters.
 glm::vec2 inside_face(bool is_quad, glm::vec2 st, glm::vec2 cell_size) {
   if (is_quad) return glm::clamp(st, kInset * cell_size, 1.f - kInset * cell_size);
-  return glm::mix(st, glm::vec2(1.f / 3), kInset * cell_size.x);
+  return glm::mix(st, glm::vec2(1.f / 3), kTriangleInset * cell_size.x);
+}
+
+// Position between the nodes of cell i of n along one axis, of which the outermost nodes are inset: below 0 and above 1
+// beyond them.
+float between_nodes(float local, int i, int n) {
+  const float low = i == 0 ? kInset : 0, high = i == n - 1 ? 1 - kInset : 1;
+  return (local - low) / (high - low);
 }
 
 }  // namespace
@@ -52,12 +62,21 @@ NodeField::NodeField(const LightMesh& mesh, const RayScene& rays, const std::vec
 }
 
 NodeShares NodeField::around(const CellNodes& cell, int face, CellPoint point) const {
+  const Grid& grid = mesh_.grid(face);
+  const int d = cell.divisions;
   NodeWeights weights;
-  if (cell.divisions > 1) {
-    const Grid own = own_grid(face, cell.divisions);
-    weights = own.interpolate(own.locate(point.local));
+  if (d > 1) {
+    const Grid own = own_grid(face, d);
+    CellPoint part = own.locate(point.local);
+    if (own.is_quad)
+      part.local = {between_nodes(part.local.x, point.cell % grid.u_count * d + part.cell % d, grid.u_count * d),
+                    between_nodes(part.local.y, point.cell / grid.u_count * d + part.cell / d, grid.v_count * d)};
+    weights = own.interpolate(part);
   } else {
-    weights = mesh_.grid(face).interpolate(point);
+    if (grid.is_quad)
+      point.local = {between_nodes(point.local.x, point.cell % grid.u_count, grid.u_count),
+                     between_nodes(point.local.y, point.cell / grid.u_count, grid.v_count)};
+    weights = grid.interpolate(point);
   }
   NodeShares shares;
   shares.count = weights.count;
@@ -107,6 +126,7 @@ NodeShares NodeField::interpolate(int face, Side side, glm::vec2 st, glm::vec3 l
   float sum = 0;
   for (std::size_t k = 0; k < count; ++k) {
     if (blocked[k] || !node_is_exposed_[shares.node[k]]) shares.weight[k] = 0;
+    shares.weight[k] = std::max(0.f, shares.weight[k]);  // no extrapolation from a part of the nodes
     sum += shares.weight[k];
   }
   if (sum < kLeastWeight) return {};

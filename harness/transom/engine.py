@@ -172,7 +172,7 @@ class Engine:
         }
 
     def form_factors(self) -> tuple[NDArray[np.int64], NDArray[np.int32], Float32, Float32]:
-        """Form factors between patches as compressed sparse rows (begin, column, value), and the patches' areas [m²]."""
+        """Form factors between patches as compressed sparse rows: begin, column, value; and patch areas [m²]."""
         begin, column, value = self._core.form_factors
         return begin, column, value, self._core.patch_areas
 

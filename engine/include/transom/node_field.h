@@ -10,7 +10,8 @@
 
 namespace transom {
 
-/// Nodes around a point and their weights (sum 1). count 0: no node can speak for the point.
+/// Nodes around a point and their weights (sum 1; slightly negative beyond the outermost nodes of a face). count 0: no
+/// node can speak for the point.
 struct NodeShares {
   std::array<int, 4> node{};
   std::array<float, 4> weight{};
