@@ -85,7 +85,7 @@ def false_colour_png(values: NDArray[np.floating], scale: Scale) -> bytes:
 
 def scale_svg(scale: Scale) -> str:
     """The printed scale: a bar with its ticks, quantity and unit, as inline SVG that follows the page's font."""
-    width, left, bar = 320, 14, 292
+    width, left, bar = 320, 18, 284
     colours = mpl.colormaps[scale.map_name](np.linspace(0, 1, SCALE_STEPS))
     step = bar / SCALE_STEPS
     parts = [

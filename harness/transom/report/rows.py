@@ -70,7 +70,7 @@ def table_1(images: Iterable[Any]) -> list[TableRow]:
         rows.append(TableRow((Cell(place), *(Cell(text) for text in plain))))
     ours_rows = [row for row in images if row.method == HEADLINE_METHOD and row.region != "exterior"]
     for (scene, view, condition), entries in groupby(ours_rows, lambda row: (row.scene, row.view, row.condition)):
-        rows.append(_group(f"{words(scene)}, view {view}, {condition}: Mitsuba 3, and Transom"))
+        rows.append(_group(f"{words(scene)}, {words(view).lower()}, {condition}: Mitsuba 3, and Transom"))
         rows += [TableRow((Cell(_region_words(row.region)), *_image_cells(row))) for row in entries]
     return rows
 
