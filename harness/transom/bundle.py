@@ -209,6 +209,10 @@ class BatchStore:
         np.savez(stream, allow_pickle=False, **arrays)
         write_atomic(self._path(index), stream.getvalue())
 
+    def count(self) -> int:
+        """How many there are."""
+        return sum(1 for path in self.folder.glob("[0-9]*.npz"))
+
     def _path(self, index: int) -> Path:
         return self.folder / f"{index:04d}.npz"
 

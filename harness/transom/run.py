@@ -30,13 +30,14 @@ MEAN_GROUPS = 64
 LEAST_BATCHES = 32
 """Published references have at least so many batches, so that Student's quantile stays near the normal one."""
 
-COARSE_VISIBILITY = "volumes"
-
 PREVIEW_BATCHES = 8
 """The same for pictures that need not be so quiet: early stages, and small pictures of hours."""
 
 JUDGED_PERCENT = 1.0
 """References at least so quiet are judged against, and have LEAST_BATCHES."""
+
+COARSE_VISIBILITY = "volumes"
+"""Visibility method of the solve with fewer patches; the other method's picture changes with it alike."""
 
 GREATEST_GROWTH = 4.0
 """A noise estimate from few batches is not trusted to order more than this many times what was rendered."""
@@ -141,8 +142,11 @@ def coarse_options(renderer: Renderer) -> dict[str, Any] | None:
 def _is_good_enough(bundle: Bundle, question: Question) -> bool:
     if question.target is None:
         return True
+    facts = bundle.record.facts
+    if int(facts.get("batches", LEAST_BATCHES)) < _least_batches(question.target):
+        return False
     # 2 % of slack: a second estimate of the same noise differs a little from the one that stopped the rendering.
-    return float(bundle.record.facts.get("relative_standard_error_percent", 0.0)) <= 1.02 * question.target.percent
+    return float(facts.get("relative_standard_error_percent", 0.0)) <= 1.02 * question.target.percent
 
 
 def _render_in_batches(
@@ -157,7 +161,7 @@ def _render_in_batches(
     case, target = question.case, question.target
     batches = cache_store().batches(case)
     count = max(int(case.options["batches"]), 2) if target is None else _least_batches(target)
-    resumed = sum(1 for index in range(count) if batches.has(index))
+    resumed = batches.count()
     image: ImageResult | None = None
     table: SensorTable | None = None
     while True:

@@ -123,6 +123,16 @@ def test_reference_stops_when_its_noise_meets_the_target_and_not_much_later() ->
     assert not cache_store().batches(question.case).folder.exists()
 
 
+def test_few_batches_are_not_enough_to_judge_by_however_quiet_they_are() -> None:
+    renderer = NoisyRenderer(relative_noise=0.001)
+    case = image_case(renderer)
+    preview = render_case(renderer, Question(case, Target(4.0)), repository_store(), keep_batches=True)
+    assert preview.record.facts["batches"] == run.PREVIEW_BATCHES
+    judged = render_case(renderer, Question(case, Target(1.0)), repository_store())
+    assert judged.record.facts["batches"] == run.LEAST_BATCHES
+    assert sorted(renderer.rendered) == list(range(run.LEAST_BATCHES))
+
+
 def test_killed_reference_goes_on_where_it_was_and_gives_the_same_answer() -> None:
     interrupted = NoisyRenderer(stop_after=11)
     question = Question(image_case(interrupted), Target(percent=4.0))
