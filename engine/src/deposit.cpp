@@ -26,7 +26,12 @@ void DirectLight::beam_transmission(glm::vec3 direction, std::span<const glm::ve
   for (std::size_t i = 0; i < points.size(); ++i) rays[i] = {points[i], direction};
   std::vector<std::uint8_t> blocked(points.size());
   rays_.occluded(RayScene::What::kOpaque, rays, blocked);
-  for (std::size_t i = 0; i < points.size(); ++i) share[i] = blocked[i] ? 0 : rays_.transmittance(rays[i]);
+  std::vector<Ray> free_rays;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (!blocked[i]) free_rays.push_back(rays[i]);
+  std::vector<float> transmitted(free_rays.size());
+  rays_.transmittance(free_rays, transmitted);
+  for (std::size_t i = 0, next = 0; i < points.size(); ++i) share[i] = blocked[i] ? 0 : transmitted[next++];
 }
 
 glm::vec3 DirectLight::point_source_illuminance(glm::vec3 point, glm::vec3 normal) const {

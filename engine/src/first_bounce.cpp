@@ -69,6 +69,7 @@ glm::vec3 FirstBounce::irradiance(glm::vec3 point, glm::vec3 normal) const {
   thread_local std::vector<Connection> connections;
   thread_local std::vector<Ray> rays;
   thread_local std::vector<std::uint8_t> blocked;
+  thread_local std::vector<float> shares;
   connections.clear();
   const auto connect = [&](glm::vec3 place, glm::vec3 irradiance) {
     connections.push_back({{point, place - point, 0, 1}, irradiance});
@@ -103,9 +104,17 @@ glm::vec3 FirstBounce::irradiance(glm::vec3 point, glm::vec3 normal) const {
   for (const Connection& c : connections) rays.push_back(c.ray);
   blocked.resize(rays.size());
   rays_.occluded(RayScene::What::kOpaque, rays, blocked);
-  glm::vec3 sum(0);
+  std::size_t kept = 0;
   for (std::size_t k = 0; k < connections.size(); ++k)
-    if (!blocked[k]) sum += connections[k].irradiance * rays_.transmittance(connections[k].ray);
+    if (!blocked[k]) {
+      rays[kept] = rays[k];
+      connections[kept++] = connections[k];
+    }
+  rays.resize(kept);
+  shares.resize(kept);
+  rays_.transmittance(rays, shares);
+  glm::vec3 sum(0);
+  for (std::size_t k = 0; k < kept; ++k) sum += connections[k].irradiance * shares[k];
   return sum;
 }
 

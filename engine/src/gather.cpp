@@ -168,16 +168,16 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
   std::vector<Hit> hits(kept);
   rays_.intersect(RayScene::What::kOpaque, segments, hits);
   const float scale = 1 / row.exposure;
+  for (std::size_t i = 0; i < kept; ++i)
+    if (hits[i].face >= 0) segments[i].t_far = hits[i].t - offset;
+  std::vector<float> transmitted(kept);
+  rays_.transmittance(segments, transmitted);
   for (std::size_t i = 0; i < kept; ++i) {
-    const bool is_outdoors = hits[i].face < 0;
-    if (!is_outdoors && mesh_.faces().is_inside_solid(hits[i].face, hits[i].side)) continue;
-    Ray crossing = segments[i];
-    crossing.t_far = is_outdoors ? Ray::kInfinity : hits[i].t - offset;
-    const float weight = scale * candidates[i].weight * rays_.transmittance(crossing);
+    const float weight = scale * candidates[i].weight * transmitted[i];
     if (weight <= 0) continue;
-    if (is_outdoors)
+    if (hits[i].face < 0)
       row.sky.push_back({sky_(segments[i].direction), weight});
-    else
+    else if (!mesh_.faces().is_inside_solid(hits[i].face, hits[i].side))
       row.through.push_back({mesh_.element_at(hits[i]), weight / kPi});
   }
 }

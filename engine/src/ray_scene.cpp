@@ -161,23 +161,36 @@ void RayScene::occluded(What what, std::span<const Ray> rays, std::span<std::uin
   }
 }
 
-float RayScene::transmittance(const Ray& ray) const {
-  if (!has_openings_) return 1;
+void RayScene::transmittance(std::span<const Ray> rays, std::span<float> shares) const {
   constexpr int kMaximumCrossings = 64;
-  const float length = glm::length(ray.direction);
-  Ray rest = ray;
-  float product = 1;
-  for (int crossing = 0; crossing < kMaximumCrossings; ++crossing) {
-    Hit hit;
-    intersect(What::kOpenings, {&rest, 1}, {&hit, 1});
-    if (hit.face < 0) return product;
-    const Face& face = faces_.faces[static_cast<std::size_t>(hit.face)];
-    const OpeningGroup& group =
-        openings_[static_cast<std::size_t>(materials_[static_cast<std::size_t>(face.material)].opening)];
-    product *= group.transmittance_at(glm::dot(face.normal, ray.direction) / length);
-    rest.t_near = hit.t * (1 + 4e-6f) + 0.1f * faces_.ray_offset() / length;
+  std::fill(shares.begin(), shares.end(), 1.f);
+  if (!has_openings_ || rays.empty()) return;
+  std::vector<Ray> rest(rays.begin(), rays.end());
+  std::vector<std::size_t> index(rays.size());
+  for (std::size_t i = 0; i < rays.size(); ++i) index[i] = i;
+  std::vector<Hit> hits(rays.size());
+  for (int crossing = 0; crossing < kMaximumCrossings && !rest.empty(); ++crossing) {
+    intersect(What::kOpenings, rest, {hits.data(), rest.size()});
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < rest.size(); ++k) {
+      const Hit& hit = hits[k];
+      if (hit.face < 0) continue;
+      const Face& face = faces_.faces[hit.face];
+      const float length = glm::length(rest[k].direction);
+      shares[index[k]] *= openings_[materials_[face.material].opening].transmittance_at(
+          glm::dot(face.normal, rest[k].direction) / length);
+      rest[kept] = rest[k];
+      rest[kept].t_near = hit.t * (1 + 4e-6f) + 0.1f * faces_.ray_offset() / length;
+      index[kept++] = index[k];
+    }
+    rest.resize(kept);
   }
-  return product;
+}
+
+float RayScene::transmittance(const Ray& ray) const {
+  float share = 1;
+  transmittance({&ray, 1}, {&share, 1});
+  return share;
 }
 
 }  // namespace transom

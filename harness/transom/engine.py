@@ -23,7 +23,7 @@ Visibility = Literal["rays", "volumes"]
 SKY_SUBDIVISION = 4
 """Reinhart's MF: 2305 bins. Coarser bins blur the sun's surroundings in a clear sky."""
 
-SKY_PICTURE_HEIGHT = 513
+SKY_PICTURE_HEIGHT = 128
 """Rows of the sky picture that is seen through openings."""
 
 

@@ -44,7 +44,9 @@ class RayScene {
   /// 1 where something opaque (or of `what`) lies between t_near and t_far, else 0.
   void occluded(What what, std::span<const Ray> rays, std::span<std::uint8_t> blocked) const;
 
-  /// Product of the transmittances of all openings between t_near and t_far. Opaque surfaces are not looked at.
+  /// Product of the transmittances of all openings between t_near and t_far of each ray. Opaque surfaces are not looked
+  /// at.
+  void transmittance(std::span<const Ray> rays, std::span<float> shares) const;
   float transmittance(const Ray& ray) const;
 
   bool has_openings() const { return has_openings_; }
