@@ -271,7 +271,7 @@ NB_MODULE(_engine, m) {
             const std::size_t n = areas.size();
             return to_array<float>(std::move(areas), {n});
           },
-          "Exposed area of each patch [m²].")
+          nb::rv_policy::move, "Exposed area of each patch [m²].")
       .def_prop_ro("sweeps", [](const Session& s) { return s.engine.lighting().sweeps; })
       .def_prop_ro("trace",
                    [](Session& s) {

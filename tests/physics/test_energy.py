@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import KNOWN, ROOMS, solved
+from solved_scenes import KNOWN, ROOMS, solved
 
 
 @pytest.mark.parametrize("name", ROOMS + KNOWN)

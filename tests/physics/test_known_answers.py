@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-import importlib
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import KNOWN, solved
+from solved_scenes import solved
 
 from transom.colour import luminance
+from transom.daylight import resolve_condition
 from transom.engine import Engine
+from transom.known_answers import compare_known_answer
+from transom.renderer import load_renderer
 from transom.scene import load_scene
+from transom.suite import SuiteCase, load_suite
 
 TOLERANCE = {"cube": 0.01, "furnace": 0.001, "three_tone": 0.005}
 MEAN_OF_CUBE = 0.002
@@ -49,29 +54,21 @@ def test_cube_has_the_exact_mean_luminance() -> None:
     assert mean == pytest.approx(2000 / 3, rel=MEAN_OF_CUBE)
 
 
-@pytest.mark.parametrize("name", KNOWN)
-def test_sensors_meet_the_known_answers(name: str) -> None:
-    known_answers = importlib.import_module("transom_reference.analytic").known_answers(load_scene(name))
-    assert known_answers
-    for answer in known_answers:
-        result = solved(name).illuminance(np.asarray(answer.points), np.asarray(answer.normals))
-        value = luminance(result["total"])
-        if answer.unit == "cd/m²":
-            value = answer.reflectance * value / np.pi + answer.own_luminance
-        computed = float(np.asarray(answer.weights) @ value)
-        assert computed == pytest.approx(answer.truth, rel=TOLERANCE[name], abs=3 * answer.uncertainty), answer.quantity
+@pytest.mark.parametrize("entry", load_suite("analytic").cases, ids=lambda entry: entry.scene.name)
+def test_luminances_meet_the_known_answers(entry: SuiteCase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TRANSOM_CACHE", str(tmp_path))
+    rows = compare_known_answer(entry, load_renderer("engine"))
+    assert rows
+    for row in rows:
+        assert row.engine == pytest.approx(row.truth, rel=TOLERANCE[entry.scene.name]), row.quantity
 
 
 @pytest.mark.parametrize("reflectance", [0.0, 0.5, 0.8, 0.9])
 def test_furnace_is_exact_for_every_reflectance(reflectance: float) -> None:
-    from dataclasses import replace
-
     scene = load_scene("furnace")
     (own,) = {material.luminance for material in scene.materials}
     white = tuple(replace(m, reflectance=(reflectance,) * 3) for m in scene.materials)
     engine = Engine.solve(replace(scene, materials=white))
-    from transom.daylight import resolve_condition
-
     engine.relight(resolve_condition(scene.conditions[0], scene.site))
     frame = engine.render(scene.views[0], edge_samples=1)
     expected = luminance(np.array(own)) / (1 - reflectance)

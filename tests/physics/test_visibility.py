@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import ROOMS, solved
 from scipy.ndimage import maximum_filter, minimum_filter
+from solved_scenes import ROOMS, solved
 
 from transom.colour import luminance
 from transom.engine import Engine
