@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import mitsuba
@@ -82,9 +83,19 @@ def test_image_carries_the_colours_of_sky_and_ground() -> None:
     assert image[-1, 0] == pytest.approx(condition.ground_luminance_rgb)
 
 
+@pytest.fixture
+def scalar_mitsuba() -> Iterator[None]:
+    """Mitsuba's scalar variant for one test; the variant is global, and other tests have theirs."""
+    before = mitsuba.variant()
+    mitsuba.set_variant("scalar_rgb")
+    yield
+    if before is not None:
+        mitsuba.set_variant(before)
+
+
+@pytest.mark.usefixtures("scalar_mitsuba")
 def test_mitsuba_reads_the_image_as_it_is_meant() -> None:
     """Mitsuba's envmap: +y is the zenith, -z its first azimuth, +x the next; ours +z, +x, +y. Float precision."""
-    mitsuba.set_variant("scalar_rgb")
     condition = resolve_condition(replace(DAY, sun_colour_temperature_k=3000), SITE)
     image = condition.environment_image(32)
     emitter = mitsuba.load_dict({"type": "envmap", "bitmap": mitsuba.Bitmap(image), "scale": 1.0})
