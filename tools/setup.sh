@@ -11,9 +11,11 @@ set -euo pipefail
 
 # The first of the given packages that this system offers, or nothing.
 first_available() {
-    local package
+    local package policy
     for package in "$@"; do
-        if apt-cache policy "$package" 2>/dev/null | grep -q '^  Candidate: [0-9]'; then
+        # Read whole before it is searched: a pipe that grep leaves early would count as a failure under pipefail.
+        policy=$(LC_ALL=C apt-cache policy "$package" 2>/dev/null) || continue
+        if grep -q '^  Candidate: [0-9]' <<<"$policy"; then
             echo "$package"
             return
         fi
