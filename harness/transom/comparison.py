@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,16 +46,99 @@ class MethodAgreement:
 
 @dataclass(frozen=True)
 class AnalyticComparison:
-    """One quantity of a scene with a known answer: ours, the truth and its uncertainty, and where the truth is from."""
+    """One quantity of a scene with a known answer: ours, the truth and its uncertainty, and where the truth is from.
+
+    program: whose value it is ("engine", "mitsuba", "radiance"). error_uncertainty_percent, batch_count: of the
+    program's own noise, 0 where it has none.
+    """
 
     scene: str
     quantity: str
     unit: str
-    engine: float
+    value: float
     truth: float
     truth_uncertainty: float
     error_percent: float
     source: str
+    program: str = "engine"
+    error_uncertainty_percent: float = 0.0
+    batch_count: int = 0
+
+
+@dataclass(frozen=True)
+class CrossCheck:
+    """One quantity of one case by two references, which must agree before either judges the engine.
+
+    first, second: renderers with their preset ("radiance accurate"). view: "" for sensors. quantity: "image mean",
+    "image blocks" (mean |relative difference| of 4x4 blocks, noise removed), "sensor" (one row each, region = its set
+    and number). difference_percent: of first from second, signed where the quantity has a sign. physics: "matched"
+    (what the engine simplifies, they simplify too) or "full". note: what explains a difference that is larger.
+    """
+
+    scene: str
+    view: str
+    region: str
+    condition: str
+    quantity: str
+    unit: str
+    physics: str
+    first: str
+    second: str
+    first_value: float
+    second_value: float
+    difference_percent: float
+    uncertainty_percent: float
+    batch_count: int = 0
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """What the method's simplifications cost: the matched reference against the full physics, on one quantity [%]."""
+
+    scene: str
+    view: str
+    region: str
+    condition: str
+    quantity: str
+    unit: str
+    matched: float
+    full: float
+    model_error_percent: float
+    uncertainty_percent: float
+
+
+@dataclass(frozen=True)
+class LadderStep:
+    """One step of raising a reference's parameters until its picture stays constant, as the method's paper did.
+
+    change_percent: mean |relative change| of pixels from the step before, None at the first. difference_percent and
+    bias_percent: from Mitsuba's reference. seconds: wall time of the rendering.
+    """
+
+    scene: str
+    view: str
+    condition: str
+    program: str
+    step: int
+    options: str
+    seconds: float
+    change_percent: float | None
+    difference_percent: float
+    bias_percent: float
+
+
+@dataclass(frozen=True)
+class HardCase:
+    """One claim about one hard case: what was expected, and whether it held, with what was seen."""
+
+    case: str
+    group: str
+    claim: str
+    expectation: str
+    holds: bool
+    seen: str
+    seconds: float
 
 
 @dataclass(frozen=True)
@@ -68,6 +152,10 @@ class Comparison:
     sensors: tuple[SensorComparison, ...] = ()
     agreements: tuple[MethodAgreement, ...] = ()
     analytic: tuple[AnalyticComparison, ...] = ()
+    crosschecks: tuple[CrossCheck, ...] = ()
+    model_errors: tuple[ModelError, ...] = ()
+    ladder: tuple[LadderStep, ...] = ()
+    hard_cases: tuple[HardCase, ...] = ()
     missing: tuple[Missing, ...] = ()
 
     def subjects(self) -> list[Subject]:
@@ -99,9 +187,19 @@ class Comparison:
             place = (pair.scene, pair.view, "", pair.condition, "volumes", "rays")
             found.append(Subject("agreement_percent", *place, pair.away_from_edges_percent))
         for entry in self.analytic:
-            place = (entry.scene, "", entry.quantity, "", "", entry.source)
+            place = (entry.scene, "", entry.quantity, "", entry.program, entry.source)
             noise = 100 * entry.truth_uncertainty / abs(entry.truth) if entry.truth else 0.0
-            found.append(Subject("analytic_percent", *place, entry.error_percent, noise))
+            noise = math.hypot(noise, entry.error_uncertainty_percent)
+            found.append(Subject("analytic_percent", *place, entry.error_percent, noise, batch_count=entry.batch_count))
+        for check in self.crosschecks:
+            pair_name = f"{check.first}, {check.physics}"
+            place = (check.scene, check.view, check.region, check.condition, pair_name, check.second)
+            quantity = "crosscheck_sensor_percent" if check.quantity == "sensor" else "crosscheck_image_percent"
+            difference, noise = check.difference_percent, check.uncertainty_percent
+            found.append(Subject(quantity, *place, difference, noise, batch_count=check.batch_count))
+        for claim in self.hard_cases:
+            place = (claim.case, "", claim.claim, claim.group, "", "expectation")
+            found.append(Subject("broken_claims", *place, 0.0 if claim.holds else 1.0))
         return found
 
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scipy import stats
@@ -31,13 +31,23 @@ GOOD_ENOUGH_SHARE = 1 / 3
 
 SELECTORS = ("scene", "view", "region", "condition", "method")
 
-QUANTITIES = (
+Quantity = Literal[
     "mean_relative_error_percent",
     "bias_percent",
+    "block_p95_percent",
     "sensor_percent",
     "analytic_percent",
     "agreement_percent",
-)
+    "crosscheck_image_percent",
+    "crosscheck_sensor_percent",
+    "baseline_percent",
+    "sun_edge_mm",
+    "energy_percent",
+    "broken_claims",
+]
+"""What can be judged; each name ends in its unit, that of the tolerance too."""
+
+QUANTITIES: tuple[str, ...] = get_args(Quantity)
 
 
 class Outcome(StrEnum):
@@ -62,13 +72,11 @@ EXIT_PRIORITY = (4, 2, 1, 3, 0)
 
 
 class Tolerance(BaseModel):
-    """One rule of tolerances.toml: a bound [%] on a quantity, why, and what it applies to (nothing: everything)."""
+    """One rule of tolerances.toml: a bound on a quantity, why, and what it applies to (nothing: everything)."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
-    quantity: Literal[
-        "mean_relative_error_percent", "bias_percent", "sensor_percent", "analytic_percent", "agreement_percent"
-    ]
+    quantity: Quantity
     tolerance: float = Field(gt=0.0, allow_inf_nan=False)
     reason: str = Field(min_length=1)
     scene: str | None = None

@@ -175,7 +175,7 @@ def _row(
         scene=entry.scene.name,
         quantity=quantity,
         unit="cd/m²",
-        engine=ours,
+        value=ours,
         truth=truth,
         truth_uncertainty=relative_uncertainty * truth,
         error_percent=100 * (ours / truth - 1),

@@ -91,7 +91,7 @@ def collect_results(judged: Sequence[tuple[Comparison, Sequence[Verdict]]], timi
             key = ("agreement_percent", pair.scene, pair.view, "", pair.condition, "volumes")
             agreements.append(AgreementRow(suite=suite, **asdict(pair), verdict=outcomes.get(key)))
         for entry in comparison.analytic:
-            key = ("analytic_percent", entry.scene, "", entry.quantity, "", "")
+            key = ("analytic_percent", entry.scene, "", entry.quantity, "", entry.program)
             analytic.append(AnalyticRow(suite=suite, **asdict(entry), verdict=outcomes.get(key)))
     return Results(
         format=RESULTS_FORMAT,

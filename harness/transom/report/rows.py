@@ -166,7 +166,7 @@ def analytic_rows(entries: Iterable[Any]) -> list[TableRow]:
                 Cell(row.quantity, title=row.source),
                 Cell(row.unit),
                 Cell(fixed(row.truth, digits)),
-                Cell(fixed(row.engine, digits)),
+                Cell(fixed(row.value, digits)),
                 Cell(signed(row.error_percent, 3)),
                 _worst([row.verdict]),
             )
