@@ -19,7 +19,7 @@ from transom.daylight.condition import Condition
 from transom.figures import DIFFERENCE_SCALE, LUMINANCE_SCALE, TimingBar, false_colour_png, scale_svg, timings_svg
 from transom.images import tone_mapped
 from transom.renderer import ImageResult, Progress, SensorResult
-from transom.report import write_report
+from transom.report.build import write_report
 from transom.report.numbers import fixed, rounded, seconds, signed
 from transom.report.results import SCHEMA_FILE, Results, results_schema
 from transom.run import reference_questions, render_case
