@@ -273,3 +273,57 @@ def _judge_missing(case: Missing) -> Verdict:
         reason=case.message,
         reference_is_good_enough=None,
     )
+
+
+# ---- Speed --------------------------------------------------------------------------------------------------------
+
+SPEED_ABSOLUTE_FLOOR_S = 0.5e-3
+"""A difference below this is nothing that anybody notices, whatever its share."""
+
+SPEED_LARGEST_UNSEEN = 1.10
+"""A build passes when its interval rules out that it is slower by this factor or more."""
+
+
+@dataclass(frozen=True)
+class SpeedChange:
+    """One quantity of two builds timed in interleaved pairs (transom.speed_pairs).
+
+    base_s, ours_s: medians [s]. ratio: median of ours / base over the rounds; low, high: its bootstrap interval at the
+    level that Sidak's formula leaves each of the quantities. control_ratio: the same for two processes of the base
+    build (A/A). threshold: ratio from which a change is relevant, learnt from A/A.
+    """
+
+    quantity: str
+    pair_count: int
+    base_s: float
+    ours_s: float
+    ratio: float
+    low: float
+    high: float
+    control_ratio: float
+    threshold: float
+
+    def looks_slower(self) -> bool:
+        """Significant (the interval excludes 1), relevant (beyond what A/A shows), and large enough to notice."""
+        return self.low > 1 and self.ratio > self.threshold and self._gain_s(self.ratio) > SPEED_ABSOLUTE_FLOOR_S
+
+    def is_clear(self) -> bool:
+        """Whether the interval leaves no room for a slowdown that matters."""
+        return self.high < SPEED_LARGEST_UNSEEN or self._gain_s(self.high) < SPEED_ABSOLUTE_FLOOR_S
+
+    def _gain_s(self, ratio: float) -> float:
+        return (ratio - 1) * self.base_s
+
+
+def decide_speed(first: SpeedChange, second: SpeedChange | None = None) -> Outcome:
+    """The rule for a quantity's speed. second: from fresh builds, measured for what looks slower at first.
+
+    slower both times   FAIL        not slower, and the last interval rules a slowdown out   PASS
+    anything else   INCONCLUSIVE: more pairs decide, or a second build where there was none
+    """
+    if first.looks_slower() and second is not None and second.looks_slower():
+        return Outcome.FAIL
+    last = second or first
+    if last.looks_slower() or not last.is_clear():
+        return Outcome.INCONCLUSIVE
+    return Outcome.PASS
