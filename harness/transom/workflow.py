@@ -272,6 +272,8 @@ def _names(entry: SuiteCase, view: str, method: str, ours: Bundle, truth: Bundle
         reference_key=truth.record.key,
         reference_batch_count=int(truth.record.facts.get("batches", 0)),
         reference_means=truth.record.facts.get("group_means_cd_m2", {}),
+        reference_file=str(truth.folder),
+        physics=str(truth.record.inputs["options"].get("physics", "matched")),
     )
 
 

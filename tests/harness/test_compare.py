@@ -169,7 +169,7 @@ def test_sensor_error_is_relative_to_the_reference() -> None:
     reference = place.measured(np.array([100.0, 0.0]), np.array([0.2, 0.0]))
     first, dark = compare_sensors(engine, reference, NAMES)
     assert first.error_percent == pytest.approx(3.0)
-    assert first.error_standard_error_percent == pytest.approx(0.2)
+    assert first.error_standard_error_percent == pytest.approx(0.2 * 1.03), "of E / R, whose derivative by R is E / R²"
     assert dark.error_percent == 0
     moved = SensorTable(("desk", "desk"), points + 0.1, normals).measured(np.ones(2), np.zeros(2))
     with pytest.raises(ValueError, match="different sensors"):
