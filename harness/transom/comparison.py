@@ -202,12 +202,14 @@ def _image_subjects(row: ImageComparison) -> list[Subject]:
         "mean_relative_error_percent": (
             row.mean_relative_error_percent,
             row.mean_relative_error_standard_error_percent,
+            row.mean_relative_error_extrapolation_percent,
             row.mean_relative_error_numerical_percent,
         ),
-        "bias_percent": (row.bias_percent, row.bias_standard_error_percent, row.bias_numerical_percent),
+        "bias_percent": (row.bias_percent, row.bias_standard_error_percent, 0.0, row.bias_numerical_percent),
         "block_p95_percent": (
             row.block_p95_percent,
             row.block_p95_standard_error_percent,
+            row.block_p95_extrapolation_percent,
             row.block_p95_numerical_percent,
         ),
     }
@@ -220,9 +222,10 @@ def _image_subjects(row: ImageComparison) -> list[Subject]:
             numerical_bias=numerical or 0.0,
             batch_count=row.reference_batch_count,
             group_count=row.reference_group_count,
+            noise_bias=noise_bias,
             fault=row.fault,
         )
-        for quantity, (value, noise, numerical) in measured.items()
+        for quantity, (value, noise, noise_bias, numerical) in measured.items()
     ]
 
 
