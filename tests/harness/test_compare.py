@@ -219,7 +219,10 @@ def noisy_with_groups(error: float = 0.02) -> tuple[ImageResult, ImageResult, Ca
 
 def test_few_groups_of_batches_are_said_so_that_students_quantile_is_theirs() -> None:
     engine, reference, names = noisy_with_groups()
-    assert compare_region(engine, reference, EVERYWHERE, "all", names).reference_group_count == 3
+    result = compare_region(engine, reference, EVERYWHERE, "all", names)
+    assert result.reference_group_count == 3
+    expected = 0.01 * smooth_truth().mean() / np.sqrt(3)
+    assert result.reference_mean_standard_error_cd_m2 == pytest.approx(expected), "spread of 1 %, by N - 1"
     without = dataclasses.replace(names, reference_means={})
     assert compare_region(engine, reference, EVERYWHERE, "all", without).reference_group_count == 2, "its two halves"
     exact = compare_region(engine, ImageResult(grey(smooth_truth())), EVERYWHERE, "all", NAMES)
