@@ -44,7 +44,7 @@ def test_disc_lights_like_a_point_away_from_shadow_edges() -> None:
 
 
 def test_edge_of_the_disc_s_shadow_is_half_lit() -> None:
-    """A sensor on the shadow edge of the sill, 1 m down the beam: half of it, where a point sun gives all or nothing."""
+    """A sensor on the shadow edge of the sill, 1 m down the beam: half of it, where a point sun is all or nothing."""
     scene = blackened(window_room("none"))
     dark: Any = replace(SUNNY, sky=UniformSky(0.0), ground_luminance_rgb=np.zeros(3))
     sill = np.array([2.0, 0.0, 0.9])
