@@ -123,7 +123,7 @@ def compare_builds(
         if suspects:
             wanted = {name.split("/")[0] for name in suspects}
             again_request = [entry for entry in request if entry[0] in wanted]
-            progress.total_cases += 2
+            progress.extend(2)
             second = _fresh_comparison(base, ours, folder / "second", setup, again_request, rounds, progress)
             again = {name: speed_change(second.times[name], len(suspects)) for name in suspects if name in second.times}
     rows = [

@@ -61,6 +61,22 @@ def test_every_round_times_each_build_once_in_an_order_of_its_own() -> None:
     assert result.times["solve"] == PairedTimes("solve", (1.0,) * 21, (1.01,) * 21, (2.0,) * 21)
 
 
+def test_repeats_take_turns_and_the_least_of_each_build_counts() -> None:
+    calls: list[str] = []
+
+    class Slowing(FakeWorker):
+        def times(self, request: Sequence[tuple[str, int]]) -> dict[str, float]:
+            self.seconds += 1.0
+            return super().times(request)
+
+    def start(_: ExitStack) -> tuple[Slowing, Slowing, Slowing]:
+        return Slowing("base", 0.0, calls), Slowing("base again", 0.0, calls), Slowing("ours", 4.0, calls)
+
+    result = measure(start, [("relight", 3)], 1, lambda *_: None, random.Random(3))
+    assert all(sorted(calls[3 * turn : 3 * turn + 3]) == ["base", "base again", "ours"] for turn in range(3))
+    assert result.times["relight"] == PairedTimes("relight", (1.0,), (1.0,), (5.0,))
+
+
 def test_processes_are_renewed_so_that_no_lucky_layout_decides() -> None:
     assert measured(2 * GENERATION_ROUNDS + 1)[2] == 3
 
