@@ -13,6 +13,7 @@ from transom.figures import TimingBar, timings_svg
 from transom.judge import ToleranceFile
 from transom.report import rows_images, rows_references, rows_speed, rows_verdicts
 from transom.report.day import Day
+from transom.report.figure_13 import CornerError, corner_table
 from transom.report.notes import NotesSection
 from transom.report.numbers import fixed, seconds, signed, words
 from transom.report.pictures import Drawing
@@ -51,6 +52,7 @@ class Pictures:
     factoring: list[Strip]
     day: Day | None
     figure_13: list[Strip]
+    corners: list[CornerError]
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,7 @@ def make_content(
         rows_references.crosschecks(results.crosschecks),
         rows_references.model_errors(results.model_errors),
         rows_references.ladder(results.ladder),
+        corner_table(pictures.corners),
         rows_references.analytic(results.analytic, results.verdicts),
         rows_references.hard_cases(results.hard_cases),
         rows_speed.use_time(rows_speed.use_times(results.timings, speed.benches, speed.loads_s, build)),

@@ -21,6 +21,8 @@ from transom.report.table import Table
 
 TEMPLATE = Path(__file__).resolve().parents[3] / "reports" / "templates" / "report.typ"
 
+JPEG_QUALITY = 92
+
 NOT_PRINTED = ("verdicts", "matrix")
 """Printed by sections of their own: the matrix in colours, and of the list of verdicts what did not pass."""
 
@@ -118,11 +120,10 @@ def _open(verdicts: Table) -> Table:
 
 
 def _picture(picture: Picture, folder: Path) -> dict[str, Any]:
-    """Writes a picture as PNG and says where it is."""
-    name = f"picture-{len(list(folder.glob('picture-*')))}.png"
-    stream = io.BytesIO()
-    Image.open(io.BytesIO(picture.content)).save(stream, "PNG")
-    (folder / name).write_bytes(stream.getvalue())
+    """Writes a picture as the PDF holds it (toned ones as JPEG, maps without loss) and says where it is."""
+    suffix = "png" if picture.suffix == "png" else "jpg"
+    name = f"picture-{len(list(folder.glob('picture-*')))}.{suffix}"
+    Image.open(io.BytesIO(picture.content)).save(folder / name, quality=JPEG_QUALITY)
     return {"file": name, "caption": picture.caption, "source": picture.source}
 
 
