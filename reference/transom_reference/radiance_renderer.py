@@ -47,7 +47,7 @@ class Preset:
 PRESETS: dict[str, Preset] = {
     "fast": Preset("-ab 3 -ad 400 -as 64 -aa 0.2 -ar 64 -lr 6 -lw 0.001", 2, 0, 1),
     "accurate": Preset("-ab 10 -ad 1024 -as 256 -aa 0.12 -ar 160 -lr 12 -lw 0.0002", 3, 0, 1),
-    "exact": Preset("-ab 100 -ad 1 -as 0 -aa 0 -lr -120 -lw 0.2", 2, 16, 32),
+    "exact": Preset("-ab 100 -ad 1 -as 0 -aa 0 -lr -120 -lw 0.2", 2, 15, 32),
 }
 
 DIRECT_PARAMETERS = "-dv- -dt 0 -dc 1 -dr 0 -dp 0 -dj 1 -ds 0 -ss 0 -st 0"
