@@ -38,6 +38,8 @@ GENERATION_ROUNDS = 8
 """Processes are started anew after so many rounds: where memory happens to lie makes one faster than another."""
 
 ORDER_SEED = 1
+LEAST_WHOLE_MS = 10.0
+"""From here on, tenths of a millisecond are enough digits."""
 
 
 class Timed(Protocol):
@@ -266,4 +268,5 @@ def _always(entries: Sequence[Mapping[str, float]]) -> list[str]:
 
 
 def _milliseconds(seconds: float) -> str:
-    return f"{1e3 * seconds:.4g} ms"
+    milliseconds = 1e3 * seconds
+    return f"{milliseconds:.1f} ms" if milliseconds >= LEAST_WHOLE_MS else f"{milliseconds:.3f} ms"
