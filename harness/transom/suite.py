@@ -45,7 +45,7 @@ class SuiteEntry(BaseModel):
     description: str = ""
     target_percent: float = Field(default=1.0, gt=0.0)
     width: int | None = Field(default=None, gt=0)
-    reference: Literal["mitsuba", "closed_form"] = "mitsuba"
+    reference: Literal["mitsuba", "closed_form", "crosscheck"] = "mitsuba"
     layout: Literal["views", "hours"] = "views"
     report: bool = True
     known: list[str] = []
