@@ -98,6 +98,7 @@ def make_content(
         rows_speed.use_time(rows_speed.use_times(results.timings, speed.benches, speed.loads_s, build)),
         rows_speed.timings(results.timings, build),
         rows_speed.benches(speed.benches),
+        rows_speed.machine_limits(speed.benches),
         rows_speed.speed_error(speed.speed_error),
         rows_speed.speed_ups(speed.speed_error),
         rows_verdicts.baseline(checked),

@@ -146,7 +146,7 @@ def verdict_list(results: Results) -> Table:
         "Scene",
         "Where",
         "Difference",
-        "k u",
+        "k\N{NO-BREAK SPACE}u",
         "b",
         "Tolerance",
         "To decide",
