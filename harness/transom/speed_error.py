@@ -60,6 +60,8 @@ REFERENCE_WIDTHS = (None, 320, 160)
 
 COLD_REPEATS, HOUR_REPEATS = 3, 5
 QUICK_COLD_REPEATS, QUICK_HOUR_REPEATS = 2, 3
+HOUR_BUDGET_S = 10.0
+"""Further hours end after so many seconds in each process, once there is one: slow programs need not be timed often."""
 
 
 @dataclass(frozen=True)
@@ -242,9 +244,9 @@ def time_program(name: str, task: Task, setting: Setting, seed: int, hours: int)
     scene = load_scene(name)
     picture = renderer.render(scene, task.condition, task.view, options)
     cold = time.perf_counter() - begin
-    seconds = []
-    for index in range(hours):
-        light = task.other if index % 2 == 0 else task.condition
+    seconds: list[float] = []
+    while len(seconds) < hours and sum(seconds) < HOUR_BUDGET_S:
+        light = task.condition if len(seconds) % 2 else task.other
         begin = time.perf_counter()
         renderer.render(scene, light, task.view, options)
         seconds.append(time.perf_counter() - begin)
