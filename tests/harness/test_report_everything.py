@@ -182,7 +182,7 @@ def test_verdicts_are_those_of_their_own_rows(content: Content) -> None:
 
 
 def test_speed_against_error_is_drawn_and_says_where_it_is_from(content: Content) -> None:
-    drawing = content.drawings[-1]
+    drawing = content.drawings["speed_error"]
     assert "mean pixel error against time" in drawing.caption
     assert "abcdef012345" in drawing.source and drawing.svg.startswith("<svg")
 

@@ -57,14 +57,14 @@ class Pictures:
 
 @dataclass(frozen=True)
 class Content:
-    """The report. tables: by name, in the order of the page."""
+    """The report. tables: by name, in the order of the page. drawings: by the name of the table that they are of."""
 
     results: Results
     headline: list[Headline]
     verdict_counts: list[tuple[str, int]]
     matrix: rows_verdicts.Matrix
     tables: dict[str, Table]
-    drawings: list[Drawing]
+    drawings: dict[str, Drawing]
     pictures: Pictures
     notes: list[NotesSection]
     absent: list[Absence]
@@ -106,13 +106,13 @@ def make_content(
         rows_verdicts.tolerance_use(tolerances, results),
         rows_verdicts.debt(tolerances),
     ]
-    drawings = []
+    drawings: dict[str, Drawing] = {}
     if results.timings:
         label = "Median and 95th percentile of each time, logarithmic"
         caption = "Median (dot) and 95th percentile (end of the line). Grey: what the paper reports on its machine."
-        drawings.append(Drawing(timings_svg(_timing_bars(results)), caption, label, build))
+        drawings["timings"] = Drawing(timings_svg(_timing_bars(results)), caption, label, build)
     if speed.speed_error is not None and speed.speed_error.rows:
-        drawings.append(speed_drawing(speed.speed_error))
+        drawings["speed_error"] = speed_drawing(speed.speed_error)
     absent = [Absence(table.title, table.command) for table in tables if not table.rows and table.command]
     if not pictures.figure_13:
         absent.append(Absence("Figure 13 of the paper", "transom run crosscheck"))

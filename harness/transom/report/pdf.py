@@ -82,10 +82,14 @@ def _record(content: Content, folder: Path) -> dict[str, Any]:
             "difference": _drawing(_standalone(scale_svg(DIFFERENCE_SCALE)), "difference", folder),
             "noise": _drawing(_standalone(scale_svg(NOISE_SCALE)), "noise", folder),
         },
-        "drawings": [
-            {"file": _drawing(entry.svg, f"drawing-{index}", folder), "caption": entry.caption, "source": entry.source}
-            for index, entry in enumerate(content.drawings)
-        ],
+        "drawings": {
+            name: {
+                "file": _drawing(entry.svg, f"drawing-{name}", folder),
+                "caption": entry.caption,
+                "source": entry.source,
+            }
+            for name, entry in content.drawings.items()
+        },
         "day": [_picture(frame, folder) for frame in (content.pictures.day.frames if content.pictures.day else [])],
         "figure_13": [
             {
