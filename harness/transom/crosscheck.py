@@ -236,7 +236,7 @@ def check_picture(
         if region == EXTERIOR:
             continue
         value, truth = float(ours[mask].mean()), float(theirs[mask].mean())
-        error = math.hypot(mean_error(first, mask), mean_error(second, mask))
+        error = math.hypot(mean_error(first, mask, region), mean_error(second, mask, region))
         rows.append(
             CrossCheck(
                 region=region,
@@ -370,7 +370,7 @@ def _view_models(entry: SuiteCase, view: View, missing: list[Missing]) -> list[M
         if region == EXTERIOR:
             continue
         values = (float(luminance(simple.mean)[mask].mean()), float(luminance(whole.mean)[mask].mean()))
-        errors = (mean_error(simple, mask), mean_error(whole, mask))
+        errors = (mean_error(simple, mask, region), mean_error(whole, mask, region))
         rows.append(_model_error(entry, view.name, region, "image mean", "cd/m²", values, errors))
     return rows
 

@@ -24,6 +24,10 @@ REFERENCE_SCALE = 2
 """Pictures here are so many times smaller than the published references."""
 
 
+LEAST_GROUPS = 8
+"""Fewer groups of batches say too little about a standard error."""
+
+
 def reference_picture(entry: SuiteCase, view: View) -> Bundle | None:
     """The published Mitsuba reference of a view, REFERENCE_SCALE times as large."""
     large = replace(view, width=REFERENCE_SCALE * view.width, height=REFERENCE_SCALE * view.height)
@@ -71,9 +75,13 @@ def halved(image: ImageResult, scale: int = REFERENCE_SCALE) -> ImageResult:
     return ImageResult(reduced(image.mean), halves, error, facts=image.facts)
 
 
-def mean_error(image: ImageResult, mask: Bool) -> float:
-    """Standard error of a region's mean luminance [cd/m²]: of independent pixels, or half the difference of the halves
-    where that is more (what pixels have in common)."""
+def mean_error(image: ImageResult, mask: Bool, region: str) -> float:
+    """Standard error of a region's mean luminance [cd/m²]: from its spread over groups of batches where that was kept
+    (pixels of a batch have paths in common); else of independent pixels, or half the difference of the halves where
+    that is more."""
+    groups = image.facts.get("group_means_cd_m2", {}).get(region, ())
+    if len(groups) >= LEAST_GROUPS:
+        return float(np.std(groups, ddof=1) / math.sqrt(len(groups)))
     independent = 0.0
     if image.standard_error is not None:
         independent = float(np.sqrt(np.sum(image.standard_error[mask].astype(np.float64) ** 2))) / int(mask.sum())
