@@ -119,7 +119,7 @@ def _bar_svg(colours: Sequence[str], labels: Sequence[tuple[float, str]], title:
     width, left, bar = 320, 18, 284
     step = bar / len(colours)
     parts = [
-        f'<rect x="{left + index * step:.2f}" y="0" width="{step + 0.3:.2f}" height="9" fill="{colour}"/>'
+        f'<rect x="{left + index * step:.2f}" y="0" width="{step + 0.3:.2f}" height="9" fill="{colour}" shape-rendering="crispEdges"/>'
         for index, colour in enumerate(colours)
     ]
     for position, label in labels:
