@@ -21,6 +21,7 @@ from transom.baseline import (
     Measured,
     baseline_file,
     bless,
+    checked_reason,
     drifts,
     read_baseline,
     worth_judging,
@@ -168,23 +169,45 @@ def write_check(path: Path, checked: Sequence[Checked]) -> None:
 def bless_suite(
     name: str, reason: str, *, seeds: int = BLESSED_SEEDS, engine: Renderer | None = None, folder: Path | None = None
 ) -> Baseline:
-    """Measures a suite with several seeds, the default one first, and blesses what was found."""
+    """Measures a suite with several seeds, the default one first, and blesses what was found.
+
+    A seed with which the engine refuses a scene is left out, and named in the history.
+    """
     if seeds < 2:
         raise InputError("are too few to know a spread", field="--seeds", value=seeds, remedy="At least 2")
     suite = load_suite(name)
     engine = engine or load_renderer(ENGINE)
+    path = baseline_file(name, folder)
+    checked_reason(reason)
+    read_baseline(path)
     default = int(engine.default_options()["seed"])
     by_case: dict[str, list[list[Measure]]] = {asked.name: [] for asked in asked_cases(suite)}
+    refused: list[str] = []
     with CaseProgress(seeds, Console(stderr=True)) as bars:
-        for number in range(seeds):
-            bars.begin(f"{name} with seed {default + number}")
-            seeded = WithOptions(engine, {"seed": default + number})
-            for asked in asked_cases(suite):
-                result, facts = _render_now(asked, seeded)
-                by_case[asked.name].append(list(measures_of(asked, result, facts, geometry=number == 0)))
+        for seed in range(default, default + seeds):
+            bars.begin(f"{name} with seed {seed}")
+            try:
+                found = _measures_with(suite, WithOptions(engine, {"seed": seed}), geometry=seed == default)
+            except InputError as error:
+                if seed == default:
+                    raise
+                refused.append(f"seed {seed}: {error}")
+                bars.finish(f"refused: {error}")
+                continue
+            for case, measures in found.items():
+                by_case[case].append(measures)
             bars.finish("measured")
     measured = [_measured(asked, engine, by_case[asked.name]) for asked in asked_cases(suite)]
-    return bless(baseline_file(name, folder), name, measured, reason, _engine_words(suite, engine))
+    return bless(path, name, measured, reason, _engine_words(suite, engine), refused=refused)
+
+
+def _measures_with(suite: Suite, engine: Renderer, *, geometry: bool) -> dict[str, list[Measure]]:
+    """By case, what is measured with one engine, without the stores."""
+    found = {}
+    for asked in asked_cases(suite):
+        result, facts = _render_now(asked, engine)
+        found[asked.name] = list(measures_of(asked, result, facts, geometry=geometry))
+    return found
 
 
 def asked_cases(suite: Suite) -> list[Asked]:
