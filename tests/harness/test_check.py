@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -32,10 +33,24 @@ class QuietReference(harness_fakes.NoisyRenderer):
         super().__init__(level=100.0, relative_noise=0.01)
 
 
-@pytest.fixture
-def room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def use(patch: pytest.MonkeyPatch, folder: Path) -> None:
+    """Scenes, stores and baselines in one folder, and renderers that take no time."""
+    patch.setenv("TRANSOM_SCENES", str(folder / "scenes"))
+    patch.setenv("TRANSOM_CACHE", str(folder / "cache"))
+    patch.setenv("TRANSOM_REFERENCES", str(folder / "references"))
+    patch.setattr("transom.baseline.BASELINES", folder / "baselines")
+    patch.setattr(harness_fakes, "QuietReference", QuietReference, raising=False)
+    patch.setattr(
+        "transom.renderer.RENDERERS", {"engine": "harness_fakes:CheapEngine", "mitsuba": "harness_fakes:QuietReference"}
+    )
+    patch.chdir(folder)
+
+
+@pytest.fixture(scope="module")
+def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A suite of one room with its references rendered and its baseline blessed."""
-    root = tmp_path / "scenes"
+    folder = tmp_path_factory.mktemp("prepared")
+    root = folder / "scenes"
     toml = ROOM_TOML.replace("display_white", "width = 48\nheight = 36\ndisplay_white")
     toml = toml.replace("reflectance = [0.3, 0.2, 0.1]", "reflectance = 0.5")
     write_scene(root / "room", toml, ROOM_OBJ + TABLE + SECOND_HALF)
@@ -43,16 +58,20 @@ def room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         'format = 1\n[suites.quick]\ntitle = "Room"\nlayout = "hours"\ncases = [{ scene = "room" }]\n'
     )
     (root / "tolerances.toml").write_text((Path(__file__).parents[2] / "scenes" / "tolerances.toml").read_text())
-    monkeypatch.setenv("TRANSOM_SCENES", str(root))
-    monkeypatch.setattr("transom.baseline.BASELINES", tmp_path / "baselines")
-    monkeypatch.setattr(harness_fakes, "QuietReference", QuietReference, raising=False)
-    monkeypatch.setattr(
-        "transom.renderer.RENDERERS", {"engine": "harness_fakes:CheapEngine", "mitsuba": "harness_fakes:QuietReference"}
-    )
-    monkeypatch.chdir(tmp_path)
-    assert run_command(["run", "references"]) == 0
-    assert run_command(["bless", "quick", "--reason", "the first values of a test", "--seeds", "3"]) == 0
-    return root
+    with pytest.MonkeyPatch.context() as patch:
+        use(patch, folder)
+        assert run_command(["run", "references"]) == 0
+        assert run_command(["bless", "quick", "--reason", "the first values of a test", "--seeds", "3"]) == 0
+    return folder
+
+
+@pytest.fixture
+def room(prepared: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of what was prepared; gives its folder of scenes."""
+    folder = tmp_path / "copy"
+    shutil.copytree(prepared, folder)
+    use(monkeypatch, folder)
+    return folder / "scenes"
 
 
 def summary() -> str:
