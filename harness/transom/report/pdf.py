@@ -125,7 +125,7 @@ def _open(verdicts: Table) -> Table:
 
 def _picture(picture: Picture, folder: Path) -> dict[str, Any]:
     """Writes a picture as the PDF holds it (toned ones as JPEG, maps without loss) and says where it is."""
-    suffix = "png" if picture.suffix == "png" else "jpg"
+    suffix = "png" if picture.scale else "jpg"
     name = f"picture-{len(list(folder.glob('picture-*')))}.{suffix}"
     Image.open(io.BytesIO(picture.content)).save(folder / name, quality=JPEG_QUALITY)
     return {"file": name, "caption": picture.caption, "source": picture.source}

@@ -28,7 +28,7 @@ from transom.visible import FirstSurfaces
 @dataclass(frozen=True)
 class Picture:
     """One picture. scale: the name of the printed scale below it, "" for one that its section prints once.
-    source: the runs that it was made from. content: the file, PNG or WebP.
+    source: the runs that it was made from. content: the file, WebP.
 
     Raises InputError for a picture that does not say where it is from.
     """
@@ -44,12 +44,8 @@ class Picture:
         require_source(self.caption, self.source)
 
     @property
-    def suffix(self) -> str:
-        return "webp" if self.content[8:12] == b"WEBP" else "png"
-
-    @property
     def uri(self) -> str:
-        return f"data:image/{self.suffix};base64," + base64.b64encode(self.content).decode()
+        return "data:image/webp;base64," + base64.b64encode(self.content).decode()
 
 
 @dataclass(frozen=True)
@@ -143,7 +139,8 @@ def toned(caption: str, rgb: NDArray[np.floating], view: View, bundle: Bundle, *
 def false_coloured(caption: str, values: NDArray[np.floating], scale: Scale, source: str) -> Picture:
     """Values on a printed scale."""
     height, width = values.shape
-    return Picture(caption, false_colour_png(values, scale), width, height, source, scale.quantity)
+    pixels = np.asarray(Image.open(io.BytesIO(false_colour_png(values, scale))).convert("RGB"))
+    return Picture(caption, webp_bytes(pixels, lossless=True), width, height, source, scale.quantity)
 
 
 def webp_bytes(pixels: NDArray[np.uint8], lossless: bool) -> bytes:

@@ -182,7 +182,7 @@ def _collect(
 
 
 def write_results(path: Path, results: Results) -> None:
-    write_atomic(path, results.model_dump_json(indent=1) + "\n")
+    write_atomic(path, results.model_dump_json() + "\n")
 
 
 def schema_texts() -> dict[str, str]:
