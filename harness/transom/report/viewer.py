@@ -52,8 +52,8 @@ NO_NOISE_VALUE = 255
 class Viewer:
     """One view in one condition, to be looked into.
 
-    pictures: ours, the reference's, their difference, and the noise; the first three are shown where no script runs, all
-    are printed in the PDF. data: what the script decodes, JSON.
+    pictures: ours, the reference's, their difference, and the noise; the first three are shown where no script runs,
+    all are printed in the PDF. data: what the script decodes, JSON.
     """
 
     anchor: str
