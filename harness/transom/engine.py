@@ -99,7 +99,10 @@ class Engine:
         return cls(scene, options, sky_bins, core)
 
     def relight(self, condition: Condition) -> None:
-        """Finds the light of a condition; the geometry is not looked at again."""
+        """Finds the light of a condition; the geometry is not looked at again.
+
+        Raises InputError for light that is negative or not finite; the engine then keeps the light that it had.
+        """
         sky_picture = condition.environment_image(SKY_PICTURE_HEIGHT)
         core_condition = _engine.Condition(
             condition.bin_luminance(self.sky_bins).astype(np.float32),
@@ -109,7 +112,10 @@ class Engine:
         )
         if condition.sun_direction is not None:
             core_condition.add_beam(_triple(condition.sun_direction), _triple(condition.sun_illuminance_rgb))
-        self._core.relight(core_condition)
+        try:
+            self._core.relight(core_condition)
+        except _engine.EngineInputError as error:
+            raise InputError(str(error), file=self.scene.file, field=f"conditions.{condition.name}") from None
         self.condition = condition
 
     def render(self, view: View, visibility: Visibility = "rays", *, edge_samples: int = 4) -> Frame:
@@ -132,8 +138,10 @@ class Engine:
         """Illuminance at points (N, 3) [m] with unit normals (N, 3): "direct", "sky", "indirect" and "total".
 
         Each (N, 3), linear RGB whose Y is lux. rays, opening_rays: samples a point.
+        Raises InputError for a point that is not finite or a normal without a direction.
         """
         self._require_light()
+        _check_sensors(points, normals, self.scene)
         parts = self._core.illuminance(
             np.ascontiguousarray(points, dtype=np.float64),
             np.ascontiguousarray(normals, dtype=np.float32),
@@ -196,6 +204,21 @@ def trace_primary(scene: Scene, view: View) -> tuple[NDArray[np.int32], Float32,
     is_opaque_face = np.array([scene.materials[m].opening < 0 for m in scene.mesh.face_material])
     interior = (face >= 0) & is_opaque_face[np.maximum(face, 0)]
     return face, position.astype(np.float32), interior
+
+
+def _check_sensors(points: Float64, normals: Float64, scene: Scene) -> None:
+    usable = np.isfinite(points).all(axis=1) & np.isfinite(normals).all(axis=1)
+    usable &= np.linalg.norm(normals, axis=1) > 0
+    if usable.all():
+        return
+    index = int(np.flatnonzero(~usable)[0])
+    raise InputError(
+        f"with the normal {normals[index].tolist()} is not finite, or its normal has no direction",
+        file=scene.file,
+        field=f"sensor {index}",
+        value=points[index].tolist(),
+        remedy="Give finite coordinates and a normal such as [0, 0, 1]",
+    )
 
 
 def _triple(vector: Float64) -> tuple[float, float, float]:
