@@ -135,8 +135,11 @@ NB_MODULE(_engine, m) {
       .def_rw("hemisphere", &GatherSamples::hemisphere)
       .def_rw("openings", &GatherSamples::openings);
 
+  nb::enum_<Method>(m, "Method").value("GATHER", Method::kGather).value("CLASSIC", Method::kClassic);
+
   nb::class_<SolveOptions>(m, "SolveOptions")
       .def(nb::init<>())
+      .def_rw("method", &SolveOptions::method)
       .def_rw("maximum_edge_m", &SolveOptions::maximum_edge_m)
       .def_rw("target_patch_count", &SolveOptions::target_patch_count)
       .def_rw("elements_per_edge", &SolveOptions::elements_per_edge)
@@ -220,6 +223,12 @@ NB_MODULE(_engine, m) {
           "relight", [](Session& s, const Condition& c) { s.engine.relight(c); }, "condition"_a,
           nb::call_guard<nb::gil_scoped_release>())
       .def(
+          "begin_relight", [](Session& s, const Condition& c) { s.engine.begin_relight(c); }, "condition"_a,
+          nb::call_guard<nb::gil_scoped_release>(), "Classic method: direct light at once, indirect light to follow.")
+      .def(
+          "continue_relight", [](Session& s, int shots) { return s.engine.continue_relight(shots); }, "shots"_a,
+          nb::call_guard<nb::gil_scoped_release>(), "Shoots at most so often; whether more is to come.")
+      .def(
           "render",
           [](Session& s, const View& view, Visibility visibility, int edge_samples) {
             Frame frame;
@@ -293,6 +302,9 @@ NB_MODULE(_engine, m) {
           },
           nb::rv_policy::move, "Exposed area of each patch [m²].")
       .def_prop_ro("sweeps", [](const Session& s) { return s.engine.lighting().sweeps; })
+      .def_prop_ro("shots", [](const Session& s) { return s.engine.lighting().shots; })
+      .def_prop_ro("unshot_share", [](const Session& s) { return s.engine.lighting().unshot_share; })
+      .def_prop_ro("forward_rays", [](const Session& s) { return s.engine.lighting().forward_ray_count; })
       .def_prop_ro("trace",
                    [](Session& s) {
                      nb::list events;

@@ -17,6 +17,7 @@ namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr std::size_t kGrain = 8;
 constexpr int kMaximumSweeps = 20000;
+constexpr int kShotsAtOnce = 1 << 20;
 constexpr double kLeakTolerance = 2e-4;    // share of interior rays that may slip through the rounding of edges
 constexpr double kConnectedShare = 0.05;   // emitters up to this share of the interior's area are connected, not hit
 constexpr float kLeastDividedSize = 0.5f;  // of the longest edge of patches: smaller cells are fine enough as they are
@@ -68,7 +69,10 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
   }
   {
     const TracePhase phase(trace_, "nodes");
-    gather_nodes(divisions);
+    if (options_.method == Method::kClassic)
+      solve_classic();
+    else
+      gather_nodes(divisions);
   }
   facts_.face_count = static_cast<int>(faces_.faces.size());
   facts_.patch_count = static_cast<int>(slot_of_patch_.size());
@@ -299,6 +303,12 @@ std::vector<BrightElement> Engine::bright_elements(const std::vector<LitElement>
 }
 
 void Engine::relight(Condition condition) {
+  if (options_.method == Method::kClassic) {
+    begin_relight(std::move(condition));
+    while (continue_relight(kShotsAtOnce)) {
+    }
+    return;
+  }
   condition.validate(sky_index_->count() - 1);
   lighting_.condition = std::move(condition);
   const std::size_t n = slot_of_patch_.size();
@@ -377,6 +387,14 @@ std::vector<Irradiance> Engine::illuminance(const std::vector<glm::dvec3>& point
 }
 
 Irradiance Engine::interpolate(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const {
+  if (options_.method == Method::kClassic) {
+    Irradiance constant;
+    const int patch = patch_of_slot_[mesh_->slot_index(face, side, mesh_->grid(face).locate(st).cell)];
+    if (patch < 0) return constant;
+    constant.sky = lighting_.patch_sky[patch];
+    constant.indirect = lighting_.patch_irradiance[patch] - lighting_.patch_sky[patch] - lighting_.patch_sun[patch];
+    return constant;
+  }
   const NodeShares shares = nodes_->interpolate(face, side, st, lifted_point);
   Irradiance result;
   if (shares.count == 0) {  // no node can speak for the point: its patch does

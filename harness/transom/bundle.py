@@ -1,11 +1,14 @@
 """Run bundles: what one renderer produced for one case, in a folder whose name is a hash of everything it depends on.
 
     <store>/<label>-<first 12 digits of the key>/
-        run.json      the record below; written last, so that a folder without it is unfinished
+        run.json      the record below; put there last, so that a folder without it is unfinished
         image.exr     the picture and its layers (transom.images), for a case with a view
         sensors.csv   set,x,y,z,nx,ny,nz,illuminance_lx,standard_error_lx, for a case with sensors
         trace.json    phases of the engine for Perfetto, where there is one
         batches/      independently seeded parts of an unfinished reference, so that a killed run repeats nothing
+        failed.json   why the case failed, if it did (transom.failures)
+
+A new answer replaces an old one as a whole (transom.staging): until it is complete, the old one stays readable.
 
 Published references are in the repository (reference/store/); everything else is in the user's cache folder.
 """
@@ -20,6 +23,7 @@ import os
 import shutil
 import zipfile
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
@@ -39,6 +43,7 @@ from transom.renderer import ImageResult, Renderer
 from transom.scene import content_key
 from transom.scene.model import Scene, View
 from transom.sensor_file import SensorTable, read_sensors, write_sensors
+from transom.staging import RECORD, settle, staged
 
 BUNDLE_FORMAT = 1
 """Raised when bundles of an earlier form can no longer be read; part of every key."""
@@ -46,7 +51,13 @@ BUNDLE_FORMAT = 1
 EFFORT_OPTIONS = frozenset({"batches"})
 """Options that say how long to look and not what to find: more batches are a better answer to the same question."""
 
+DATA_FILES = ("image.exr", "sensors.csv", "trace.json")
+
 REPOSITORY_STORE = Path(__file__).resolve().parents[2] / "reference" / "store"
+
+
+class OtherVersionError(InputError):
+    """A bundle of another BUNDLE_FORMAT: not an answer here, and no damage."""
 
 
 class FileRecord(BaseModel):
@@ -171,18 +182,26 @@ class Bundle:
         """The illuminances. Raises InputError if the file is not what was written."""
         return read_sensors(self._checked("sensors.csv"))
 
+    def is_whole(self) -> bool:
+        """Whether every file is the one that was written."""
+        return all(_is_file(self.folder / name, expected) for name, expected in self.record.files.items())
+
     def _checked(self, name: str) -> Path:
         path = self.folder / name
         expected = self.record.files.get(name)
         if expected is None:
             raise InputError(f"is a bundle without {name}", file=self.folder)
-        if not path.is_file() or _file_record(path) != expected:
-            raise InputError(
-                "is damaged: it is not the file that was written",
-                file=path,
-                remedy=f"Delete {self.folder} and run again",
-            )
-        return path
+        if _is_file(path, expected):
+            return path
+        # Another process may have put a better answer here since the record was read.
+        present = read_bundle(self.folder)
+        if present is not None and name in present.record.files and _is_file(path, present.record.files[name]):
+            return path
+        raise InputError(
+            "is damaged: it is not the file that was written",
+            file=path,
+            remedy=f"Delete {self.folder} and run again",
+        )
 
 
 @dataclass(frozen=True)
@@ -230,9 +249,10 @@ class Store:
         """The finished bundle of a case, whatever label it was given, or None."""
         key = case.key
         for folder in sorted(self.root.glob(f"*-{key[:12]}")):
-            bundle = read_bundle(folder)
-            if bundle is not None and bundle.record.key == key:
-                return bundle
+            with suppress(OtherVersionError):
+                bundle = read_bundle(folder)
+                if bundle is not None and bundle.record.key == key:
+                    return bundle
         return None
 
     def batches(self, case: Case) -> BatchStore:
@@ -249,30 +269,32 @@ class Store:
         wall_seconds: float,
         half: bool = True,
     ) -> Bundle:
-        """Writes a finished run: the data first, run.json last. An earlier answer of the same case is replaced."""
+        """Writes a finished run, which replaces an earlier answer of the same case as a whole, or not at all.
+
+        Raises StorageError when the disk is full or read-only; the earlier answer is then as it was.
+        """
         folder = self.folder(case)
-        (folder / "run.json").unlink(missing_ok=True)
-        if image is not None:
-            write_exr(folder / "image.exr", image, half)
-        if sensors is not None:
-            write_sensors(folder / "sensors.csv", sensors)
-        if trace is not None:
-            write_atomic(folder / "trace.json", json.dumps(trace))
-        names = [name for name in ("image.exr", "sensors.csv", "trace.json") if (folder / name).is_file()]
-        record = RunRecord(
-            format=BUNDLE_FORMAT,
-            key=case.key,
-            label=case.label,
-            kind=case.kind,
-            inputs=case.inputs(),
-            effort={name: case.options[name] for name in sorted(EFFORT_OPTIONS & case.options.keys())},
-            facts=dict(facts),
-            files={name: _file_record(folder / name) for name in names},
-            wall_seconds=round(wall_seconds, 3),
-            finished=datetime.now(UTC).replace(microsecond=0),
-            provenance=current_provenance(),
-        )
-        write_atomic(folder / "run.json", json_text(record.model_dump(mode="json")))
+        with staged(folder) as stage:
+            if image is not None:
+                write_exr(stage / "image.exr", image, half)
+            if sensors is not None:
+                write_sensors(stage / "sensors.csv", sensors)
+            if trace is not None:
+                write_atomic(stage / "trace.json", json.dumps(trace))
+            record = RunRecord(
+                format=BUNDLE_FORMAT,
+                key=case.key,
+                label=case.label,
+                kind=case.kind,
+                inputs=case.inputs(),
+                effort={name: case.options[name] for name in sorted(EFFORT_OPTIONS & case.options.keys())},
+                facts=dict(facts),
+                files={name: _file_record(stage / name) for name in DATA_FILES if (stage / name).is_file()},
+                wall_seconds=round(wall_seconds, 3),
+                finished=datetime.now(UTC).replace(microsecond=0),
+                provenance=current_provenance(),
+            )
+            write_atomic(stage / RECORD, json_text(record.model_dump(mode="json")))
         return Bundle(folder, record)
 
     def drop_batches(self, case: Case) -> None:
@@ -281,18 +303,32 @@ class Store:
 
 
 def read_bundle(folder: Path) -> Bundle | None:
-    """The bundle in a folder, or None while it is unfinished. Raises InputError for a malformed run.json."""
-    path = folder / "run.json"
-    if not path.is_file():
-        return None
+    """The bundle in a folder, or None while it is unfinished.
+
+    Raises OtherVersionError for a bundle of another format, and InputError for a malformed run.json.
+    """
+    with suppress(OSError):  # a folder that cannot be written keeps its earlier answer
+        settle(folder)
+    path = folder / RECORD
     try:
-        return Bundle(folder, RunRecord.model_validate_json(path.read_bytes()))
+        text = path.read_bytes()
+    except FileNotFoundError:
+        return None
+    remedy = f"Delete {folder} and run again"
+    try:
+        content = json.loads(text)
+        version = content["format"]
+    except (ValueError, TypeError, KeyError) as error:
+        raise InputError(f"is not a run record ({error})", file=path, remedy=remedy) from error
+    if version != BUNDLE_FORMAT:
+        problem = f"is of another version: this Transom reads {BUNDLE_FORMAT}"
+        raise OtherVersionError(problem, file=path, field="format", value=version, remedy=remedy)
+    try:
+        return Bundle(folder, RunRecord.model_validate(content))
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"]) or "run.json"
-        raise InputError(
-            f"is not valid ({first['msg']})", file=path, field=place, remedy=f"Delete {folder} and run again"
-        ) from error
+        place = ".".join(str(part) for part in first["loc"]) or RECORD
+        raise InputError(f"is not valid ({first['msg']})", file=path, field=place, remedy=remedy) from error
 
 
 def cache_store() -> Store:
@@ -340,6 +376,10 @@ def _array_key(*arrays: NDArray[np.float64]) -> str:
     for array in arrays:
         digest.update(str(array.shape).encode() + np.ascontiguousarray(array, "<f8").tobytes())
     return digest.hexdigest()
+
+
+def _is_file(path: Path, expected: FileRecord) -> bool:
+    return path.is_file() and path.stat().st_size == expected.bytes and _file_record(path) == expected
 
 
 def _file_record(path: Path) -> FileRecord:

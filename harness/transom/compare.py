@@ -1,11 +1,7 @@
 """Compares two answers to one case: error measures with their uncertainties, and no opinion.
 
-Every relative error of a pixel is |L - R| / (R + floor), with a floor of 1 % of the median of R (transom.noise).
-A noisy reference R inflates it. It is therefore given raw, and extrapolated to a reference without noise: with
-independent halves R1 and R2 of N/2 samples each, the inflation is close to proportional to the variance, so
-    error(no noise) = 2 error(N) - error(N/2),
-where error(N/2) is the mean over the two halves. The true value lies between the two (the inflation is concave in the
-variance where noise dominates, and then the extrapolation removes too little of it, not too much).
+The measures of a picture are in transom.error_measures. A value of the engine that is not finite counts as 0 and is
+named as a fault of its row; one of the reference is an error, since nothing can be judged by it.
 """
 
 from __future__ import annotations
@@ -17,18 +13,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transom.colour import luminance
-from transom.noise import floor_cd_m2
+from transom.error_measures import (
+    Region,
+    block_error_quantiles,
+    block_errors,
+    cross_half_mse,
+    mean_relative_error,
+    signed_relative_error,
+)
+from transom.errors import InputError
+from transom.noise import FLOOR_SHARE, floor_cd_m2
 from transom.renderer import ImageResult
 from transom.sensor_file import SensorTable
 
+__all__ = [
+    "CaseNames",
+    "ImageComparison",
+    "SensorComparison",
+    "block_errors",
+    "compare_images",
+    "compare_region",
+    "compare_sensors",
+    "cross_half_mse",
+    "signed_relative_error",
+]
+
 Bool = NDArray[np.bool_]
 Float64 = NDArray[np.float64]
-
-BLOCK_PIXELS = 4
-"""Side of the blocks whose mean luminances are compared."""
-
-LEAST_GROUPS = 8
-"""Fewer groups of batches say too little about a standard error."""
 
 SHARE_LIMITS_PERCENT = (2.0, 5.0, 10.0)
 
@@ -38,11 +49,16 @@ class ImageComparison:
     """One region of one view. All errors in percent; signed ones are ours minus the reference's.
 
     reference_mean_standard_error_cd_m2: of the region's mean. reference_standard_error_percent: mean over the pixels of
-    the reference's own relative standard error. mean_relative_error_percent: extrapolated to no noise; its standard
-    error bounds what the noise can do to it. relative_rmse_percent: from independent halves, unbiased by noise, as a
-    share of the reference's mean; None where it is below the noise. block_*: quantiles of |relative error| over
-    blocks of 4x4 pixels. share_within_*: of pixels. *_numerical_percent: the engine's own numerical bias of that
-    quantity, from a solve with half as many patches; None where it was not estimated.
+    the reference's own relative standard error. mean_relative_error_percent, block_*: extrapolated to no noise, with
+    its standard error; *_extrapolation: bound on what that left of the noise; *_raw: against the noisy reference.
+    block_*: quantiles
+    of |relative error| over blocks of 4x4 pixels. pixel_*, share_within_*: of pixels, raw. relative_rmse_percent: from
+    independent halves, unbiased by noise, as a share of the reference's mean; None where it is below the noise.
+    dark_pixel_count: pixels where the reference is below the floor; light_leak_percent: our light in excess there, as a
+    share of all light of the region. *_numerical_percent: the engine's own numerical bias of that quantity, from a
+    solve with half as many patches; None where it was not estimated. physics: of the reference, "matched" or "full".
+    reference_group_count: groups of batches whose spread the uncertainty of the mean is from. fault: what makes the
+    engine's picture wrong whatever the reference says, "" for nothing.
     """
 
     scene: str
@@ -74,13 +90,27 @@ class ImageComparison:
     bias_numerical_percent: float | None = None
     engine_key: str = ""
     reference_key: str = ""
+    block_p95_raw_percent: float = 0.0
+    block_p95_standard_error_percent: float = 0.0
+    block_p95_numerical_percent: float | None = None
+    mean_relative_error_extrapolation_percent: float = 0.0
+    block_p95_extrapolation_percent: float = 0.0
+    pixel_p50_percent: float = 0.0
+    pixel_p95_percent: float = 0.0
+    pixel_p99_percent: float = 0.0
+    dark_pixel_count: int = 0
+    light_leak_percent: float = 0.0
+    physics: str = "matched"
+    reference_group_count: int = 0
+    fault: str = ""
 
 
 @dataclass(frozen=True)
 class SensorComparison:
     """One sensor: place [m], illuminances [lx], and the signed relative error [%].
 
-    error_numerical_percent: as for images, the engine's own numerical bias, None where it was not estimated.
+    The error is relative to the reference, or to 1 % of the median of all sensors where that is more.
+    error_numerical_percent, physics, fault: as for images.
     """
 
     scene: str
@@ -101,12 +131,15 @@ class SensorComparison:
     error_numerical_percent: float | None = None
     engine_key: str = ""
     reference_key: str = ""
+    physics: str = "matched"
+    fault: str = ""
 
 
 @dataclass(frozen=True)
 class CaseNames:
     """What a comparison is of. reference_means: by region, the reference's mean luminance [cd/m²] in each of several
-    groups of batches, from which the uncertainty of its mean is known whatever its pixels have in common."""
+    groups of batches, from which the uncertainty of its mean is known whatever its pixels have in common.
+    reference_file: for errors. physics: "matched" to the engine's simplifications, or "full"."""
 
     scene: str
     condition: str
@@ -117,32 +150,8 @@ class CaseNames:
     reference_key: str = ""
     reference_batch_count: int = 0
     reference_means: Mapping[str, Sequence[float]] = field(default_factory=dict)
-
-
-def cross_half_mse(engine: Float64, half_1: Float64, half_2: Float64) -> float:
-    """Mean squared luminance error, unbiased by the reference's noise [(cd/m²)²].
-
-    half_1, half_2: independent estimates of one reference, any one shape, cd/m². E[(E - R1)(E - R2)] = (E - R)², since
-    the two noises are independent. May be negative: then the error is below the noise.
-    """
-    return float(np.mean((engine - half_1) * (engine - half_2)))
-
-
-def signed_relative_error(engine: Float64, reference: Float64, floor: float) -> Float64:
-    """(E - R) / (R + floor), elementwise; 0 where both are black."""
-    scale = reference + floor
-    difference = engine - reference
-    return np.divide(difference, scale, out=np.zeros_like(difference), where=scale > 0)
-
-
-def block_errors(engine: Float64, reference: Float64, mask: Bool, floor: float) -> Float64:
-    """|relative error| of the mean luminance of 4x4 pixel blocks, (B,). Blocks with half of their pixels in `mask` or
-    more count, by those pixels."""
-    counts = _block_sums(mask.astype(np.float64))
-    kept = counts >= BLOCK_PIXELS**2 / 2
-    ours = _block_sums(np.where(mask, engine, 0.0))[kept] / counts[kept]
-    theirs = _block_sums(np.where(mask, reference, 0.0))[kept] / counts[kept]
-    return np.abs(signed_relative_error(ours, theirs, floor))
+    reference_file: str = ""
+    physics: str = "matched"
 
 
 def compare_region(
@@ -155,38 +164,24 @@ def compare_region(
 ) -> ImageComparison:
     """Compares the pixels in `mask` (h, w). coarse: the engine's picture from half as many patches, if there is one.
 
-    Raises ValueError for an empty mask or pictures of different size.
+    Raises ValueError for an empty mask or pictures of different size, InputError for a reference that is not finite.
     """
     if engine.mean.shape != reference.mean.shape:
         raise ValueError(f"pictures of {engine.mean.shape} and {reference.mean.shape} cannot be compared")
     if not mask.any():
         raise ValueError(f"region {region} has no pixel")
-    ours_image = luminance(engine.mean).astype(np.float64)
-    theirs_image = luminance(reference.mean).astype(np.float64)
-    ours, theirs = ours_image[mask], theirs_image[mask]
-    floor = floor_cd_m2(theirs)
-    halves = _half_luminances(reference, mask, theirs)
-    error = np.abs(signed_relative_error(ours, theirs, floor))
-    half_error = np.mean([np.abs(signed_relative_error(ours, half, floor)) for half in halves], axis=0)
-    without_noise = 2 * error - half_error
-    pixel_error = np.zeros(len(theirs)) if reference.standard_error is None else reference.standard_error[mask]
-    mean, count = float(theirs.mean()), len(theirs)
-    mean_error = _mean_standard_error(names.reference_means.get(region, ()), pixel_error, halves)
-    relative_noise = _ratio(pixel_error, theirs + floor)
-    # What the noise does to the mean of `without_noise`: to its first term, and to the extrapolation added to it.
-    # What pixels have in common is in the mean's own uncertainty.
-    spread = np.hypot(np.sqrt(np.mean(relative_noise**2)), np.std(error - half_error)) / np.sqrt(count)
-    spread = np.hypot(spread, mean_error / mean if mean > 0 else 0.0)
-    mse = cross_half_mse(ours, *halves)
-    blocks = block_errors(ours_image, theirs_image, mask, floor)
-    quantiles = np.percentile(blocks if blocks.size else error, [50, 95, 99])
-    error_numerical, bias_numerical = None, None
-    if coarse is not None:
-        rough = luminance(coarse.mean).astype(np.float64)[mask]
-        rough_error = np.abs(signed_relative_error(rough, theirs, floor))
-        error_numerical = 100 * abs(float(error.mean() - rough_error.mean()))
-        bias_numerical = 100 * abs(float(ours.mean() - rough.mean())) / mean if mean > 0 else 0.0
-    within = [100 * float(np.mean(error <= limit / 100)) for limit in SHARE_LIMITS_PERCENT]
+    sample, fault, group_count, mean_error = _sampled(engine, reference, mask, region, names)
+    ours, theirs, floor = sample.ours[mask], sample.reference[mask], sample.floor
+    mean = float(theirs.mean())
+    bias = _relative_difference(float(ours.mean()), mean)
+    error = mean_relative_error(sample)
+    pixels = np.abs(signed_relative_error(ours, theirs, floor))
+    blocks = block_error_quantiles(sample)
+    mse = cross_half_mse(ours, sample.halves[0][mask], sample.halves[1][mask])
+    numerical = _numerical_percent(sample, coarse) if coarse is not None else (None, None, None)
+    dark = theirs < floor
+    within = [100 * float(np.mean(pixels <= limit / 100)) for limit in SHARE_LIMITS_PERCENT]
+    quantiles = [100 * float(value) for value in np.percentile(pixels, [50, 95, 99])]
     return ImageComparison(
         scene=names.scene,
         view=names.view,
@@ -194,29 +189,42 @@ def compare_region(
         condition=names.condition,
         method=names.method,
         reference=names.reference,
-        pixel_count=count,
+        pixel_count=len(theirs),
         floor_cd_m2=floor,
         engine_mean_cd_m2=float(ours.mean()),
         reference_mean_cd_m2=mean,
         reference_mean_standard_error_cd_m2=mean_error,
-        reference_standard_error_percent=100 * float(np.mean(relative_noise)),
-        mean_relative_error_percent=max(0.0, 100 * float(without_noise.mean())),
-        mean_relative_error_raw_percent=100 * float(error.mean()),
-        mean_relative_error_standard_error_percent=100 * float(spread),
-        bias_percent=100 * (float(ours.mean()) / mean - 1) if mean > 0 else 0.0,
-        bias_standard_error_percent=100 * mean_error / mean if mean > 0 else 0.0,
+        reference_standard_error_percent=100 * float(np.mean(_ratio(sample.noise[mask], theirs + floor))),
+        mean_relative_error_percent=100 * error.value,
+        mean_relative_error_raw_percent=100 * error.raw,
+        mean_relative_error_standard_error_percent=100 * error.standard_error,
+        bias_percent=100 * bias,
+        bias_standard_error_percent=100 * max(1.0, 1 + bias) * sample.level_error,
         relative_rmse_percent=100 * float(np.sqrt(mse)) / mean if mse >= 0 and mean > 0 else None,
-        block_p50_percent=100 * float(quantiles[0]),
-        block_p95_percent=100 * float(quantiles[1]),
-        block_p99_percent=100 * float(quantiles[2]),
+        block_p50_percent=100 * blocks[0].value,
+        block_p95_percent=100 * blocks[1].value,
+        block_p99_percent=100 * blocks[2].value,
         share_within_2_percent=within[0],
         share_within_5_percent=within[1],
         share_within_10_percent=within[2],
         reference_batch_count=names.reference_batch_count,
-        mean_relative_error_numerical_percent=error_numerical,
-        bias_numerical_percent=bias_numerical,
+        mean_relative_error_numerical_percent=numerical[0],
+        bias_numerical_percent=numerical[1],
         engine_key=names.engine_key,
         reference_key=names.reference_key,
+        block_p95_raw_percent=100 * blocks[1].raw,
+        block_p95_standard_error_percent=100 * blocks[1].standard_error,
+        block_p95_numerical_percent=numerical[2],
+        mean_relative_error_extrapolation_percent=100 * error.extrapolation,
+        block_p95_extrapolation_percent=100 * blocks[1].extrapolation,
+        pixel_p50_percent=quantiles[0],
+        pixel_p95_percent=quantiles[1],
+        pixel_p99_percent=quantiles[2],
+        dark_pixel_count=int(dark.sum()),
+        light_leak_percent=100 * float(np.maximum(ours - theirs, 0)[dark].sum() / theirs.sum()) if mean > 0 else 0.0,
+        physics=names.physics,
+        reference_group_count=group_count,
+        fault=fault,
     )
 
 
@@ -227,24 +235,32 @@ def compare_images(
     names: CaseNames,
     coarse: ImageResult | None = None,
 ) -> list[ImageComparison]:
-    """Region by region; masks by name, as of `transom.visible.region_masks`."""
-    return [compare_region(engine, reference, mask, name, names, coarse) for name, mask in masks.items()]
+    """Region by region; masks by name, as of `transom.visible.region_masks`. A region without a pixel has no row."""
+    return [compare_region(engine, reference, mask, name, names, coarse) for name, mask in masks.items() if mask.any()]
 
 
 def compare_sensors(
     engine: SensorTable, reference: SensorTable, names: CaseNames, coarse: SensorTable | None = None
 ) -> list[SensorComparison]:
     """Sensor by sensor. coarse: the engine's values from half as many patches, if there are any.
-    Raises ValueError when the tables are not of the same, measured, sensors."""
+
+    Raises ValueError when the tables are not of the same, measured, sensors, InputError for a reference that is not
+    finite.
+    """
     if engine.illuminance is None or reference.illuminance is None or reference.standard_error is None:
         raise ValueError("sensors without values cannot be compared")
     if engine.points.shape != reference.points.shape or not np.allclose(engine.points, reference.points, atol=1e-6):
         raise ValueError("the two tables are of different sensors")
+    if not (np.isfinite(reference.illuminance).all() and np.isfinite(reference.standard_error).all()):
+        raise _not_finite_reference(names, "illuminance")
+    floor = FLOOR_SHARE * float(np.median(reference.illuminance))
     rows: list[SensorComparison] = []
     for index, (name, point) in enumerate(zip(reference.sets, reference.points, strict=True)):
-        ours, theirs = float(engine.illuminance[index]), float(reference.illuminance[index])
+        measured, theirs = float(engine.illuminance[index]), float(reference.illuminance[index])
+        ours, fault = (measured, "") if np.isfinite(measured) else (0.0, f"illuminance of the engine is {measured}")
         error = float(reference.standard_error[index])
-        scale = theirs if theirs > 0 else 1.0
+        # Without any light in the reference, light of the engine is an error of 100 %.
+        scale = max(theirs, floor) or abs(ours) or 1.0
         rough = None if coarse is None or coarse.illuminance is None else float(coarse.illuminance[index])
         rows.append(
             SensorComparison(
@@ -261,43 +277,90 @@ def compare_sensors(
                 reference_lx=theirs,
                 reference_standard_error_lx=error,
                 error_percent=100 * (ours - theirs) / scale,
-                error_standard_error_percent=100 * error / scale,
+                error_standard_error_percent=100 * error / scale * max(1.0, ours / scale),
                 reference_batch_count=names.reference_batch_count,
                 error_numerical_percent=None if rough is None else 100 * abs(ours - rough) / scale,
                 engine_key=names.engine_key,
                 reference_key=names.reference_key,
+                physics=names.physics,
+                fault=fault,
             )
         )
     return rows
 
 
-def _mean_standard_error(
-    group_means: Sequence[float], pixel_error: NDArray[np.floating], halves: tuple[Float64, Float64]
-) -> float:
-    """Standard error of the reference's mean luminance [cd/m²]: from its spread over groups of batches; without them
-    the larger of what independent pixels would give and half the difference of the halves."""
-    if len(group_means) >= LEAST_GROUPS:
-        return float(np.std(group_means, ddof=1) / np.sqrt(len(group_means)))
-    independent = float(np.sqrt(np.sum(pixel_error**2.0))) / len(pixel_error)
-    return max(independent, abs(float(np.mean(halves[0] - halves[1]))) / 2)
+def _sampled(
+    engine: ImageResult, reference: ImageResult, mask: Bool, region: str, names: CaseNames
+) -> tuple[Region, str, int, float]:
+    """The luminances to compare, the engine's fault, how many groups of batches the reference's mean is known from,
+    and the standard error of that mean [cd/m²]."""
+    ours, theirs = (luminance(picture.mean).astype(np.float64) for picture in (engine, reference))
+    broken = int(np.count_nonzero(~np.isfinite(ours[mask])))
+    fault = f"{broken} of {np.count_nonzero(mask)} pixels of the engine are not finite" if broken else ""
+    halves = (theirs, theirs)
+    if reference.halves is not None:
+        first, second = (luminance(half).astype(np.float64) for half in reference.halves)
+        halves = (first, second)
+    noise = np.zeros_like(theirs)
+    if reference.standard_error is not None:
+        noise = reference.standard_error.astype(np.float64)
+    if not all(np.isfinite(picture[mask]).all() for picture in (theirs, noise, *halves)):
+        raise _not_finite_reference(names, "image.exr")
+    groups = names.reference_means.get(region, ())
+    if len(groups) < 2 and reference.halves is not None:
+        groups = [float(half[mask].mean()) for half in halves]
+    mean_error = _mean_standard_error(groups, noise[mask])
+    mean = float(theirs[mask].mean())
+    sample = Region(
+        ours=np.nan_to_num(ours, nan=0.0, posinf=0.0, neginf=0.0),
+        reference=theirs,
+        halves=halves,
+        noise=noise,
+        mask=mask,
+        floor=floor_cd_m2(theirs[mask]),
+        level_error=mean_error / mean if mean > 0 else 0.0,
+    )
+    return sample, fault, len(groups), mean_error
 
 
-def _half_luminances(reference: ImageResult, mask: Bool, mean: Float64) -> tuple[Float64, Float64]:
-    if reference.halves is None:
-        return mean, mean
-    first, second = (luminance(half).astype(np.float64)[mask] for half in reference.halves)
-    return first, second
+def _numerical_percent(sample: Region, coarse: ImageResult) -> tuple[float, float, float]:
+    """How far mean relative error, bias and 95th percentile of blocks move with half as many patches [%]."""
+    mask, floor = sample.mask, sample.floor
+    rough = np.nan_to_num(luminance(coarse.mean).astype(np.float64), nan=0.0, posinf=0.0, neginf=0.0)
+    errors, biases, tails = [], [], []
+    for image in (sample.ours, rough):
+        errors.append(float(np.abs(signed_relative_error(image[mask], sample.reference[mask], floor)).mean()))
+        biases.append(_relative_difference(float(image[mask].mean()), float(sample.reference[mask].mean())))
+        blocks = block_errors(image, sample.reference, mask, floor)
+        tails.append(float(np.percentile(blocks, 95)))
+    error, bias, tail = (100 * abs(pair[0] - pair[1]) for pair in (errors, biases, tails))
+    return error, bias, tail
 
 
-def _block_sums(image: Float64) -> Float64:
-    side = BLOCK_PIXELS
-    height, width = (-(-length // side) * side for length in image.shape)
-    padded = np.zeros((height, width))
-    padded[: image.shape[0], : image.shape[1]] = image
-    sums: Float64 = padded.reshape(height // side, side, width // side, side).sum(axis=(1, 3))
-    return sums
+def _relative_difference(ours: float, reference: float) -> float:
+    """Of two means; 1 where the reference is black and ours is not."""
+    if reference > 0:
+        return ours / reference - 1
+    return 1.0 if ours > 0 else 0.0
 
 
-def _ratio(values: NDArray[np.floating], scale: Float64) -> Float64:
-    plain = np.asarray(values, np.float64)
-    return np.divide(plain, scale, out=np.zeros_like(plain), where=scale > 0)
+def _mean_standard_error(group_means: Sequence[float], noise: Float64) -> float:
+    """Standard error of the reference's mean luminance [cd/m²]: from its spread over groups of batches (two halves at
+    least), and never less than what independent pixels would have."""
+    independent = float(np.sqrt(np.sum(noise**2))) / len(noise)
+    if len(group_means) < 2:
+        return independent
+    return max(independent, float(np.std(group_means, ddof=1) / np.sqrt(len(group_means))))
+
+
+def _not_finite_reference(names: CaseNames, what: str) -> InputError:
+    return InputError(
+        "holds values that are not finite: nothing can be judged by it",
+        file=names.reference_file or names.reference_key or names.reference,
+        field=what,
+        remedy="Delete the bundle and render it again: transom run references",
+    )
+
+
+def _ratio(values: Float64, scale: Float64) -> Float64:
+    return np.divide(values, scale, out=np.zeros_like(values), where=scale > 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,6 +64,7 @@ class AnalyticComparison:
     program: str = "engine"
     error_uncertainty_percent: float = 0.0
     batch_count: int = 0
+    physics: str = "closed form"
 
 
 @dataclass(frozen=True)
@@ -165,24 +167,14 @@ class Comparison:
         """
         found: list[Subject] = []
         for row in self.images:
-            if row.region == EXTERIOR:
-                continue
-            place = (row.scene, row.view, row.region, row.condition, row.method, row.reference)
-            batches = row.reference_batch_count
-            error, noise = row.mean_relative_error_percent, row.mean_relative_error_standard_error_percent
-            numerical = row.mean_relative_error_numerical_percent or 0.0
-            found.append(Subject("mean_relative_error_percent", *place, error, noise, numerical, batches))
-            bias, noise, numerical = (
-                row.bias_percent,
-                row.bias_standard_error_percent,
-                row.bias_numerical_percent or 0.0,
-            )
-            found.append(Subject("bias_percent", *place, bias, noise, numerical, batches))
+            if row.region != EXTERIOR:
+                found += _image_subjects(row)
         for sensor in self.sensors:
             place = (sensor.scene, "", sensor.set, sensor.condition, sensor.method, sensor.reference)
             error, noise = sensor.error_percent, sensor.error_standard_error_percent
             numerical, batches = sensor.error_numerical_percent or 0.0, sensor.reference_batch_count
-            found.append(Subject("sensor_percent", *place, error, noise, numerical, batches))
+            subject = Subject("sensor_percent", *place, error, noise, numerical, batches, fault=sensor.fault)
+            found.append(subject)
         for pair in self.agreements:
             place = (pair.scene, pair.view, "", pair.condition, "volumes", "rays")
             found.append(Subject("agreement_percent", *place, pair.away_from_edges_percent))
@@ -201,6 +193,46 @@ class Comparison:
             place = (claim.case, "", claim.claim, claim.group, "", "expectation")
             found.append(Subject("broken_claims", *place, 0.0 if claim.holds else 1.0))
         return found
+
+
+def _image_subjects(row: ImageComparison) -> list[Subject]:
+    """The scales at which a region is judged: pixels, the image mean, and blocks."""
+    place = (row.scene, row.view, row.region, row.condition, row.method, row.reference)
+    measured = {
+        "mean_relative_error_percent": (
+            row.mean_relative_error_percent,
+            row.mean_relative_error_standard_error_percent,
+            row.mean_relative_error_extrapolation_percent,
+            row.mean_relative_error_numerical_percent,
+        ),
+        "bias_percent": (row.bias_percent, row.bias_standard_error_percent, 0.0, row.bias_numerical_percent),
+        "block_p95_percent": (
+            row.block_p95_percent,
+            row.block_p95_standard_error_percent,
+            row.block_p95_extrapolation_percent,
+            row.block_p95_numerical_percent,
+        ),
+    }
+    return [
+        Subject(
+            quantity,
+            *place,
+            difference=value,
+            uncertainty=noise,
+            numerical_bias=numerical or 0.0,
+            batch_count=row.reference_batch_count,
+            group_count=row.reference_group_count,
+            noise_bias=noise_bias,
+            fault=row.fault,
+        )
+        for quantity, (value, noise, noise_bias, numerical) in measured.items()
+    ]
+
+
+def reference_kind(physics: str) -> str:
+    """What agreement with a reference shows: "validation" against the full physics; "verification" against one that
+    shares the engine's simplifications or is a closed form (the code solves its equations)."""
+    return "validation" if physics == "full" else "verification"
 
 
 def compare_methods(scene: str, view: str, condition: str, volumes: ImageResult, rays: ImageResult) -> MethodAgreement:
@@ -224,7 +256,9 @@ def compare_methods(scene: str, view: str, condition: str, volumes: ImageResult,
 
 
 def write_comparison(path: Path, comparison: Comparison) -> None:
-    write_atomic(path, TypeAdapter(Comparison).dump_json(comparison, indent=1) + b"\n")
+    """Numbers that are not finite are kept (as NaN and Infinity), so that they are judged and not lost."""
+    plain = TypeAdapter(Comparison).dump_python(comparison)
+    write_atomic(path, json.dumps(plain, indent=1, ensure_ascii=False) + "\n")
 
 
 def read_comparison(path: Path) -> Comparison:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Literal, Self
 
@@ -19,6 +20,7 @@ from transom.scene.model import Scene, View
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 Visibility = Literal["rays", "volumes"]
+Method = Literal["gather", "classic"]
 
 SKY_SUBDIVISION = 4
 """Reinhart's MF: 2305 bins. Coarser bins blur the sun's surroundings in a clear sky."""
@@ -31,6 +33,8 @@ SKY_PICTURE_HEIGHT = 128
 class SolveOptions:
     """Settings of a solve; the defaults serve every scene.
 
+    method: "gather" (light gathered at nodes), or "classic", the published method: forward rays from sun and sky,
+    constant patches, progressive shooting [Cutler et al. 2008].
     maximum_edge_m: of a patch [m]; 0 chooses it from target_patch_count. elements_per_edge: a patch has its square.
     patch_rays, patch_opening_rays: rays a patch, over the hemisphere and towards the openings; node_*: the same for
     each point at which light is shown (a node). node_spacing: of nodes, against the harmonic mean distance of what
@@ -38,6 +42,7 @@ class SolveOptions:
     at which interreflection stops. seed: of all samples.
     """
 
+    method: Method = "gather"
     maximum_edge_m: float = 0.0
     target_patch_count: int = 3000
     elements_per_edge: int = 4
@@ -103,6 +108,39 @@ class Engine:
 
         Raises InputError for light that is negative or not finite; the engine then keeps the light that it had.
         """
+        core_condition = self._core_condition(condition)
+        with self._input_errors(condition):
+            self._core.relight(core_condition)
+        self.condition = condition
+
+    def relight_in_steps(self, condition: Condition, shots: int = 64) -> Iterator[float]:
+        """Classic method: new direct light at once, then the old indirect light replaced, `shots` patches at a time.
+
+        Yields the share of flux still in flight; after each, `render` and `illuminance` show a usable state. Left
+        early, the next relighting goes on from there. Raises InputError for another method.
+        """
+        if self.options.method != "classic":
+            remedy = 'Solve with method "classic"'
+            raise InputError("cannot relight in steps", field="method", value=self.options.method, remedy=remedy)
+        core_condition = self._core_condition(condition)
+        with self._input_errors(condition):
+            self._core.begin_relight(core_condition)
+        self.condition = condition
+        more = True
+        while more:
+            yield float(self._core.unshot_share)
+            more = self._core.continue_relight(shots)
+        yield float(self._core.unshot_share)
+
+    @contextmanager
+    def _input_errors(self, condition: Condition) -> Iterator[None]:
+        """The engine's errors about a condition, with the condition's place."""
+        try:
+            yield
+        except _engine.EngineInputError as error:
+            raise InputError(str(error), file=self.scene.file, field=f"conditions.{condition.name}") from None
+
+    def _core_condition(self, condition: Condition) -> _engine.Condition:
         sky_picture = condition.environment_image(SKY_PICTURE_HEIGHT)
         core_condition = _engine.Condition(
             condition.bin_luminance(self.sky_bins).astype(np.float32),
@@ -112,11 +150,7 @@ class Engine:
         )
         if condition.sun_direction is not None:
             core_condition.add_beam(_triple(condition.sun_direction), _triple(condition.sun_illuminance_rgb))
-        try:
-            self._core.relight(core_condition)
-        except _engine.EngineInputError as error:
-            raise InputError(str(error), file=self.scene.file, field=f"conditions.{condition.name}") from None
-        self.condition = condition
+        return core_condition
 
     def render(self, view: View, visibility: Visibility = "rays", *, edge_samples: int = 4) -> Frame:
         """The present light from a camera. visibility: sun by shadow rays or by stencil shadow volumes.
@@ -193,6 +227,16 @@ class Engine:
         """Gauss-Seidel sweeps of the last relighting."""
         return int(self._core.sweeps)
 
+    @property
+    def shots(self) -> int:
+        """Classic method: how often patches shot in the last relighting."""
+        return int(self._core.shots)
+
+    @property
+    def forward_rays(self) -> int:
+        """Classic method: rays cast from sun, sky and ground in the last relighting."""
+        return int(self._core.forward_rays)
+
     def _require_light(self) -> None:
         if self.condition is None:
             raise RuntimeError("relight the engine before looking at it")
@@ -250,6 +294,7 @@ def _core_bins(bins: SkyBins) -> _engine.SkyBins:
 
 def _core_options(options: SolveOptions, trace: bool) -> _engine.SolveOptions:
     core = _engine.SolveOptions()
+    core.method = _engine.Method.CLASSIC if options.method == "classic" else _engine.Method.GATHER
     core.maximum_edge_m = options.maximum_edge_m
     core.target_patch_count = options.target_patch_count
     core.elements_per_edge = options.elements_per_edge

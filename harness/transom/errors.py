@@ -1,4 +1,4 @@
-"""The one exception for bad input: names the file, the field, the value found, what is allowed and what to do."""
+"""The exception for bad input: names the file, the field, the value found, what is allowed and what to do."""
 
 from __future__ import annotations
 
@@ -26,3 +26,7 @@ class InputError(Exception):
             text += f" {remedy.rstrip('. ')}."
         super().__init__(text)
         self.file, self.field, self.value, self.remedy = file, field, value, remedy
+
+
+class StorageError(InputError):
+    """A file that cannot be written: the disk is full, or the folder read-only. Going on would lose work."""

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
+from functools import partial
 
 from rich.console import Console
 
-from transom.bundle import cache_store, repository_store
+from transom.bundle import Store, cache_store, repository_store
 from transom.progress import CaseProgress
-from transom.renderer import load_renderer
-from transom.run import Question, reference_questions, render_case
+from transom.renderer import Renderer, load_renderer
+from transom.run import Question, free_first, reference_questions, render_case
 from transom.suite import load_suite, read_suites
 
 REFERENCE_RENDERER = "mitsuba"
@@ -44,22 +45,25 @@ def run_references(scenes: Collection[str], *, fresh: bool = False) -> None:
     renderer = load_renderer(REFERENCE_RENDERER)
     questions = published_questions(scenes)
     store = repository_store()
-    steps = [(stage, question) for stage in STAGES for question in questions]
-    total = sum(_work(question, stage) for stage, question in steps)
-    with CaseProgress(len(steps), Console(stderr=True), total) as bars:
-        for stage, question in steps:
-            target = replace(question.target, percent=stage * question.target.percent) if question.target else None
-            words = f"{question.case.label} to {target.percent:g} %" if target else question.case.label
-            bars.begin(words, _work(question, stage))
-            is_fresh = fresh and stage == STAGES[0]
-            bundle = render_case(
-                renderer, Question(question.case, target), store, bars.update, fresh=is_fresh, keep_batches=True
-            )
-            facts, size = bundle.record.facts, sum(file.bytes for file in bundle.record.files.values())
-            noise = float(facts["relative_standard_error_percent"])
-            bars.finish(f"has {noise:.3f} %, {facts['batches']} batches, {size / 1e6:.2f} MB")
+    total = sum(_work(question, stage) for stage in STAGES for question in questions)
+    with CaseProgress(len(STAGES) * len(questions), Console(stderr=True), total) as bars:
+        for stage in STAGES:
+            free_first(questions, partial(_run_stage, renderer, store, bars, stage, fresh and stage == STAGES[0]))
     for question in questions:
         cache_store().drop_batches(question.case)
+
+
+def _run_stage(
+    renderer: Renderer, store: Store, bars: CaseProgress, stage: float, fresh: bool, question: Question, wait: bool
+) -> None:
+    target = replace(question.target, percent=stage * question.target.percent) if question.target else None
+    words = f"{question.case.label} to {target.percent:g} %" if target else question.case.label
+    bars.begin(words, _work(question, stage))
+    step = replace(question, target=target, command=f"transom run references --scene {question.case.scene.name}")
+    bundle = render_case(renderer, step, store, bars.update, fresh=fresh, keep_batches=True, wait=wait)
+    facts, size = bundle.record.facts, sum(file.bytes for file in bundle.record.files.values())
+    noise = float(facts["relative_standard_error_percent"])
+    bars.finish(f"has {noise:.3f} %, {facts['batches']} batches, {size / 1e6:.2f} MB")
 
 
 def _work(question: Question, stage: float) -> float:

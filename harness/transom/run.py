@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,12 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transom.bundle import BatchStore, Bundle, Case, Store, cache_store, find_bundle, make_case
+from transom.claims import CaseBusyError, announced, claimed
 from transom.colour import luminance
-from transom.errors import InputError
+from transom.errors import InputError, StorageError
+from transom.failures import clear_failure, write_failure
+from transom.files import require_writable
 from transom.noise import mean_relative_standard_error
 from transom.renderer import ImageResult, Progress, Renderer, SensorResult
 from transom.scene.model import Scene, View
 from transom.sensor_file import SensorTable, scene_sensors
+from transom.staging import sweep
 from transom.suite import Suite
 from transom.visible import first_surfaces, region_masks
 
@@ -53,10 +58,11 @@ class Target:
 
 @dataclass(frozen=True)
 class Question:
-    """One case and, for a reference, how well it is to be answered."""
+    """One case and, for a reference, how well it is to be answered. command: what asks it again, if it fails."""
 
     case: Case
     target: Target | None = None
+    command: str = ""
 
 
 def render_case(
@@ -67,31 +73,85 @@ def render_case(
     *,
     fresh: bool = False,
     keep_batches: bool = False,
+    wait: bool = True,
 ) -> Bundle:
     """The bundle of a case: found in the repository or the cache, else rendered and written to `store` (the cache).
 
     fresh: render again even when an answer exists. A reference that has batches is resumed where it was stopped;
-    keep_batches: so that it can be made quieter later.
+    keep_batches: so that it can be made quieter later. A damaged answer counts as none. One process at a time renders
+    a case: the others wait for it, or with wait=False raise CaseBusyError. A failure leaves failed.json and is raised.
     """
     case, store = question.case, store or cache_store()
-    found = None if fresh else store.find(case) or find_bundle(case)
-    if found is not None and _is_good_enough(found, question):
-        return found
+    if not fresh:
+        found = _usable(question, store)
+        if found is not None and is_good_enough(found, question):
+            return found
+    with claimed(cache_store().root, case.key, wait=wait):
+        # Looked at again: whoever held the claim before may have answered it.
+        found = None if fresh else _usable(question, store)
+        if found is not None and is_good_enough(found, question):
+            return found
+        require_writable(store.root)
+        sweep(store.folder(case))
+        sweep(cache_store().folder(case))
+        try:
+            bundle = _render(renderer, question, store, progress, found, fresh, keep_batches)
+        except StorageError:
+            raise
+        except Exception as error:
+            write_failure(case, error, question.command)
+            raise
+        clear_failure(case)
+        return bundle
+
+
+def _usable(question: Question, store: Store) -> Bundle | None:
+    """The answer to a case that is there and whole."""
+    with suppress(InputError):  # a malformed record is as good as none: it is about to be replaced
+        found = store.find(question.case) or find_bundle(question.case)
+        return found if found is not None and found.is_whole() else None
+    return None
+
+
+def _render(
+    renderer: Renderer,
+    question: Question,
+    store: Store,
+    progress: Progress | None,
+    found: Bundle | None,
+    fresh: bool,
+    keep_batches: bool,
+) -> Bundle:
+    case = question.case
     if fresh:
         cache_store().drop_batches(case)
     # The time of a reference counts from its first batch on.
     started = time.perf_counter() - (found.record.wall_seconds if found is not None else 0.0)
     if "batches" in renderer.default_options():
-        bundle = _render_in_batches(renderer, question, store, progress, started, keep_batches)
-    elif case.view is not None:
+        return _render_in_batches(renderer, question, store, progress, started, keep_batches)
+    if case.view is not None:
         image = renderer.render(case.scene, case.condition, case.view, case.options, progress)
         facts, trace = _without_trace(image.facts)
         seconds = time.perf_counter() - started
-        bundle = store.write(case, image=image, facts=facts, trace=trace, wall_seconds=seconds, half=False)
-    else:
-        table, facts = _measure(renderer, case, case.options, progress)
-        bundle = store.write(case, sensors=table, facts=facts, wall_seconds=time.perf_counter() - started)
-    return bundle
+        return store.write(case, image=image, facts=facts, trace=trace, wall_seconds=seconds, half=False)
+    table, facts = _measure(renderer, case, case.options, progress)
+    return store.write(case, sensors=table, facts=facts, wall_seconds=time.perf_counter() - started)
+
+
+def free_first(questions: Sequence[Question], work: Callable[[Question, bool], None]) -> None:
+    """Does work(question, wait) for each. One that another process is rendering is left to the end, then waited for.
+
+    work raises CaseBusyError when it may not wait and would have to.
+    """
+    with announced(cache_store().root, (question.case.key for question in questions)):
+        busy: list[Question] = []
+        for question in questions:
+            try:
+                work(question, False)
+            except CaseBusyError:
+                busy.append(question)
+        for question in busy:
+            work(question, True)
 
 
 def reference_questions(suite: Suite, renderer: Renderer, options: Mapping[str, Any]) -> Iterator[Question]:
@@ -139,7 +199,8 @@ def coarse_options(renderer: Renderer) -> dict[str, Any] | None:
     return None if count is None else {"visibility": COARSE_VISIBILITY, "target_patch_count": int(count) // 2}
 
 
-def _is_good_enough(bundle: Bundle, question: Question) -> bool:
+def is_good_enough(bundle: Bundle, question: Question) -> bool:
+    """Whether an answer has the batches, and the quiet, that its question asks for."""
     if question.target is None:
         return True
     facts = bundle.record.facts

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import traceback
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from transom.bundle import Bundle, find_bundle, make_case
+from transom.claims import CaseBusyError
 from transom.compare import CaseNames, ImageComparison, SensorComparison, compare_images, compare_sensors
 from transom.comparison import (
     COMPARISON_FORMAT,
@@ -22,13 +22,14 @@ from transom.comparison import (
     read_comparison,
     write_comparison,
 )
-from transom.errors import InputError
+from transom.errors import InputError, StorageError
+from transom.failures import error_words, read_failure
 from transom.files import write_atomic
 from transom.judge import Missing, Outcome, Verdict, exit_code, judge, read_tolerances
 from transom.known_answers import compare_known_answer
 from transom.progress import CaseProgress
 from transom.renderer import ImageResult, Renderer, load_renderer
-from transom.run import COARSE_VISIBILITY, Question, coarse_options, engine_questions, render_case
+from transom.run import COARSE_VISIBILITY, Question, coarse_options, engine_questions, free_first, render_case
 from transom.scene import scene_root
 from transom.scene.model import View
 from transom.sensor_file import SensorTable, scene_sensors
@@ -76,41 +77,58 @@ def chosen(suite: Suite, scenes: Collection[str]) -> Suite:
 
 
 def render_suite(suite: Suite, *, fresh: bool = False) -> list[Crash]:
-    """Renders with the engine what is not there yet. A case that fails does not stop the others."""
+    """Renders with the engine what is not there yet. A case that fails does not stop the others; a disk that takes no
+    more files does (StorageError)."""
     if suite.reference == "closed_form":
         return []
     renderer = load_renderer(ENGINE)
-    questions = list(engine_questions(suite, renderer, VISIBILITIES))
+    return render_questions(renderer, list(engine_questions(suite, renderer, VISIBILITIES)), suite.name, fresh=fresh)
+
+
+def render_questions(
+    renderer: Renderer, questions: Sequence[Question], suite: str, *, fresh: bool = False
+) -> list[Crash]:
+    """Answers questions of a suite, those that another process is at last; gives the ones that failed."""
     crashes: list[Crash] = []
     with CaseProgress(len(questions), Console(stderr=True)) as bars:
-        for question in questions:
-            bars.begin(_question_words(question))
+
+        def work(question: Question, wait: bool) -> None:
+            bars.begin(question_words(question))
+            asked = replace(question, command=f"transom run {suite} --scene {question.case.scene.name}")
             try:
-                bundle = render_case(renderer, question, progress=bars.update, fresh=fresh)
+                bundle = render_case(renderer, asked, progress=bars.update, fresh=fresh, wait=wait)
+            except (CaseBusyError, StorageError):
+                raise
             except Exception as error:
                 crashes.append(Crash(question, error_words(error)))
                 bars.finish(f"crashed: {crashes[-1].message}")
             else:
                 bars.finish(f"{bundle.record.wall_seconds:.1f} s")
+
+        free_first(questions, work)
     return crashes
 
 
-def error_words(error: Exception) -> str:
-    """An error as one line: bad input in its own words, anything else with its kind."""
-    if isinstance(error, InputError):
-        return str(error)
-    return " ".join("".join(traceback.format_exception_only(error)).split())
-
-
-def _question_words(question: Question) -> str:
+def question_words(question: Question) -> str:
+    """A case for people: its label, and what tells it from others of that label."""
     options = question.case.options
     patches = options.get("target_patch_count", "")
     return " ".join(str(part) for part in (question.case.label, options.get("visibility", ""), patches) if part)
 
 
 def compare_finished(name: str, build: Path) -> Comparison:
-    """Compares what has been rendered of a suite."""
-    return compare_suite(load_suite(name), build, [])
+    """Compares what has been rendered of a suite. What failed when it was last rendered has no answer."""
+    suite = load_suite(name)
+    return compare_suite(suite, build, stored_failures(suite))
+
+
+def stored_failures(suite: Suite) -> list[Crash]:
+    """The cases of a suite that failed when they were last rendered, as their failure bundles say."""
+    if suite.reference == "closed_form":
+        return []
+    questions = engine_questions(suite, load_renderer(ENGINE), VISIBILITIES)
+    found = ((question, read_failure(question.case)) for question in questions)
+    return [Crash(question, failure.error) for question, failure in found if failure is not None]
 
 
 def compare_suite(suite: Suite, build: Path, crashes: Collection[Crash]) -> Comparison:
@@ -272,6 +290,8 @@ def _names(entry: SuiteCase, view: str, method: str, ours: Bundle, truth: Bundle
         reference_key=truth.record.key,
         reference_batch_count=int(truth.record.facts.get("batches", 0)),
         reference_means=truth.record.facts.get("group_means_cd_m2", {}),
+        reference_file=str(truth.folder),
+        physics=str(truth.record.inputs["options"].get("physics", "matched")),
     )
 
 

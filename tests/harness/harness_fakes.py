@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -126,3 +128,49 @@ class NoisyRenderer:
 def grey(values: NDArray[np.floating]) -> NDArray[np.float32]:
     """(..., ) -> (..., 3): equal red, green and blue, whose luminance is the value."""
     return np.repeat(np.asarray(values, np.float32)[..., None], 3, axis=-1)
+
+
+class CheapEngine:
+    """Takes the engine's place: a level that depends on the scene's reflectance, and a note of every case it renders.
+
+    $CHEAP_ENGINE_LOG: file to which each finished rendering adds a line; $CHEAP_ENGINE_SECONDS: how long one takes;
+    $CHEAP_ENGINE_FAILS: condition whose rendering raises an error.
+    """
+
+    name = "engine"
+    version = "cheap-1"
+
+    def default_options(self) -> dict[str, Any]:
+        return {"visibility": "rays", "seed": 1}
+
+    def render(
+        self,
+        scene: Scene,
+        condition: Condition,
+        view: View,
+        options: Mapping[str, Any],  # noqa: ARG002
+        progress: Progress | None = None,  # noqa: ARG002
+    ) -> ImageResult:
+        level = self._level(scene, condition)
+        return ImageResult(np.full((view.height, view.width, 3), level, np.float32))
+
+    def illuminance(
+        self,
+        scene: Scene,
+        condition: Condition,
+        points: NDArray[np.float64],
+        normals: NDArray[np.float64],  # noqa: ARG002
+        options: Mapping[str, Any],  # noqa: ARG002
+        progress: Progress | None = None,  # noqa: ARG002
+    ) -> SensorResult:
+        return SensorResult(np.full((len(points), 3), self._level(scene, condition)), np.zeros(len(points)))
+
+    def _level(self, scene: Scene, condition: Condition) -> float:
+        time.sleep(float(os.environ.get("CHEAP_ENGINE_SECONDS", "0")))
+        if os.environ.get("CHEAP_ENGINE_FAILS") == condition.name:
+            raise ArithmeticError("light went backwards")
+        log = os.environ.get("CHEAP_ENGINE_LOG")
+        if log is not None:
+            with Path(log).open("a") as stream:
+                stream.write(f"{scene.name} {condition.name}\n")
+        return 100.0 * scene.materials[0].reflectance[0]

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "transom/classic.h"
 #include "transom/deposit.h"
 #include "transom/first_bounce.h"
 #include "transom/gather.h"
@@ -19,8 +20,13 @@
 
 namespace transom {
 
+/// How light is found and shown. kGather: light gathered at nodes, interpolated between them. kClassic: the published
+/// method, constant patches lit by forward rays and shooting (classic.h).
+enum class Method { kGather, kClassic };
+
 /// Settings of a solve. The defaults serve every scene.
 struct SolveOptions {
+  Method method = Method::kGather;
   float maximum_edge_m = 0;       ///< of a patch; 0: from the target number of patches
   int target_patch_count = 3000;  ///< sides of cells that take part in the exchange of light, about
   int elements_per_edge = 4;      ///< a patch has the square of it
@@ -66,7 +72,12 @@ struct Lighting {
   std::vector<glm::vec3> patch_irradiance;         ///< all light [lx]
   std::vector<glm::vec3> patch_smooth_radiosity;   ///< what nodes find by rays: M + rho (E - direct) [lm/m²]
   std::vector<glm::vec3> element_direct;           ///< patch * elements_per_slot + element [lx]
+  std::vector<glm::vec3> patch_sky;                ///< kClassic: directly from sky and ground [lx]
+  std::vector<glm::vec3> patch_sun;                ///< kClassic: directly from beams and point sources [lx]
   int sweeps = 0;
+  int shots = 0;              ///< kClassic: patches that have shot
+  double unshot_share = 0;    ///< kClassic: flux in flight, relative
+  int forward_ray_count = 0;  ///< kClassic
 };
 
 class Engine {
@@ -78,6 +89,12 @@ class Engine {
 
   /// Relights for a condition: everything but the image.
   void relight(Condition condition);
+
+  /// kClassic: relights step by step. The direct light is that of the new condition at once; `continue_relight` shoots
+  /// at most `shots` times, replaces the old condition's indirect light by as much, and says whether more is to come.
+  /// Throws InputError for another method.
+  void begin_relight(Condition condition);
+  bool continue_relight(int shots);
 
   /// Irradiance at points (world coordinates [m]) with unit normals, under the present condition.
   std::vector<Irradiance> illuminance(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
@@ -114,6 +131,8 @@ class Engine {
   void assemble_transfer(std::vector<GatherRow>& rows);
   std::vector<int> cell_divisions(const std::vector<GatherRow>& rows) const;
   void gather_nodes(const std::vector<int>& divisions);
+  void solve_classic();
+  void show_classic();
   std::vector<Share> to_patches(const std::vector<Share>& elements) const;
   glm::vec3 sky_light(const SparseRows& rows, std::size_t row) const;
   std::vector<BrightElement> bright_elements(const std::vector<LitElement>& lit) const;
@@ -143,6 +162,10 @@ class Engine {
   // Where light is shown.
   std::unique_ptr<NodeField> nodes_;
   SparseRows node_sky_, node_patches_;
+
+  // kClassic alone.
+  std::unique_ptr<ForwardRays> forward_rays_;
+  std::unique_ptr<ProgressiveRadiosity> shooting_;
 
   Lighting lighting_;
 };

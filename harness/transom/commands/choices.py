@@ -22,6 +22,13 @@ class RendererName(StrEnum):
     mitsuba = "mitsuba"
 
 
+class Method(StrEnum):
+    """How the engine finds light: gathered at nodes, or by the published method that it began with."""
+
+    gather = "gather"
+    classic = "classic"
+
+
 class Visibility(StrEnum):
     """How the engine finds the direct sun: stencil shadow volumes or shadow rays."""
 

@@ -59,7 +59,7 @@ def report(
     \b
     Example:  transom report
     """
-    from transom.report import write_report
+    from transom.report.build import write_report
 
     code = write_report(output, build, render=not rendered)
     typer.echo(f"{output / 'index.html'}")

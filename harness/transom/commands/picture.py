@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from transom.commands.choices import RendererName, Visibility, checked_output, chosen_condition, chosen_view
+from transom.commands.choices import Method, RendererName, Visibility, checked_output, chosen_condition, chosen_view
 
 SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help="Name of a scene, or the path of a scene folder.")]
 TimeOption = Annotated[
@@ -34,6 +34,9 @@ def render(
     sky: SkyOption = None,
     renderer: Annotated[RendererName, typer.Option(help="Who renders.")] = RendererName.engine,
     visibility: Annotated[Visibility, typer.Option(help="How the engine finds the direct sun.")] = Visibility.volumes,
+    method: Annotated[
+        Method, typer.Option(help="How the engine finds light: gather, or classic (the published method).")
+    ] = Method.gather,
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Pixels; the view's own size if omitted.")] = None,
     noise: NoiseOption = None,
 ) -> None:
@@ -55,7 +58,7 @@ def render(
     chosen = chosen_view(loaded, view, size)
     resolved = resolve_condition(chosen_condition(loaded, condition, time, sky), loaded.site)
     worker = load_renderer(renderer.value)
-    options = {"visibility": visibility.value} if renderer is RendererName.engine else {}
+    options = {"visibility": visibility.value, "method": method.value} if renderer is RendererName.engine else {}
     target = None if renderer is RendererName.engine else Target(noise or DEFAULT_PICTURE_NOISE_PERCENT)
     case = make_case(loaded, resolved, worker, options, view=chosen)
     with single_progress(case.label) as bars:

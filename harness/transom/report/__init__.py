@@ -1,5 +1,1 @@
-"""The report: one HTML page and one JSON file, from the same tables."""
-
-from transom.report.build import write_report
-
-__all__ = ["write_report"]
+"""The report: one HTML page, PDF, JUnit, JSON and CSV, from the same tables. `transom.report.build` writes them."""
