@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "transom/error.h"
+#include "transom/overlap.h"
 #include "transom/parallel.h"
 #include "transom/sampling.h"
 #include "transom/survey.h"
@@ -31,7 +32,8 @@ enum Stream : std::uint64_t {
   kSensorStream,
   kAuditStream,
   kSurveyStream,
-  kSourceStream
+  kSourceStream,
+  kUnseenStream = 1u << 20
 };
 
 }  // namespace
@@ -46,6 +48,7 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
     sky_index_ = std::make_unique<SkyBinIndex>(sky_bins);
     const std::vector<char> is_indoors =
         survey_interior(scene_, *rays_, faces_, hash_seed(options_.seed, kSurveyStream));
+    check_overlaps(faces_, is_indoors);
     const std::vector<float> edges =
         choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
     facts_.maximum_edge_m = *std::min_element(edges.begin(), edges.end());
@@ -57,8 +60,10 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
   std::vector<int> divisions;
   {
     const TracePhase phase(trace_, "patches");
-    find_patches(first_slots(), rows);
+    patch_of_slot_.assign(static_cast<std::size_t>(mesh_->slot_count()), -1);
+    find_patches(first_wave(), rows);
     mark_interior(rows);
+    find_unseen_patches(rows);
     check_closed(rows);
   }
   {
@@ -102,11 +107,10 @@ std::vector<int> Engine::first_slots() const {
   return slots;
 }
 
-// Rows wave by wave: what a patch sees becomes a patch in the next wave, until nothing new is seen.
-void Engine::find_patches(const std::vector<int>& first, std::vector<GatherRow>& rows) {
-  patch_of_slot_.assign(static_cast<std::size_t>(mesh_->slot_count()), -1);
+// Where the search for patches starts: first_slots, and what point sources light.
+std::vector<int> Engine::first_wave() const {
   const int per_slot = mesh_->elements_per_slot();
-  std::vector<int> wave = first;
+  std::vector<int> wave = first_slots();
   for (std::size_t i = 0; i < scene_.point_sources.size(); ++i) {
     const SobolSequence points(hash_seed(options_.seed, kSourceStream + i));
     std::vector<Ray> rays;
@@ -124,7 +128,12 @@ void Engine::find_patches(const std::vector<int>& first, std::vector<GatherRow>&
   }
   std::sort(wave.begin(), wave.end());
   wave.erase(std::unique(wave.begin(), wave.end()), wave.end());
+  return wave;
+}
 
+// Rows wave by wave: what a patch sees becomes a patch in the next wave, until nothing new is seen.
+void Engine::find_patches(std::vector<int> wave, std::vector<GatherRow>& rows) {
+  const int per_slot = mesh_->elements_per_slot();
   while (!wave.empty()) {
     for (const int slot : wave) {
       patch_of_slot_[slot] = static_cast<int>(slot_of_patch_.size());
@@ -144,6 +153,20 @@ void Engine::find_patches(const std::vector<int>& first, std::vector<GatherRow>&
     std::sort(next.begin(), next.end());
     next.erase(std::unique(next.begin(), next.end()), next.end());
     wave = std::move(next);
+  }
+}
+
+// Slots that see patches indoors without having been seen by them: then those are indoors, too.
+void Engine::find_unseen_patches(std::vector<GatherRow>& rows) {
+  for (std::uint64_t round = 0;; ++round) {
+    std::vector<char> is_interior(patch_of_slot_.size(), 0);
+    for (std::size_t p = 0; p < rows.size(); ++p) is_interior[slot_of_patch_[p]] = is_interior_[p];
+    const std::vector<int> unseen =
+        slots_that_see(is_interior, patch_of_slot_, *mesh_, *rays_, hash_seed(options_.seed, kUnseenStream + round));
+    if (unseen.empty()) return;
+    find_patches(unseen, rows);
+    unseen_slots_.insert(unseen_slots_.end(), unseen.begin(), unseen.end());
+    mark_interior(rows);
   }
 }
 
@@ -171,6 +194,7 @@ void Engine::mark_interior(const std::vector<GatherRow>& rows) {
     if (scene_.materials[faces_.faces[mesh_->slot(slot).face].material].opening >= 0 ||
         rows[patch_of_slot_[slot]].escaped == 0)
       mark(patch_of_slot_[slot]);
+  for (const int slot : unseen_slots_) mark(patch_of_slot_[slot]);
   if (!scene_.point_sources.empty())
     for (std::size_t p = 0; p < rows.size(); ++p) mark(static_cast<int>(p));
   while (!stack.empty()) {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -312,11 +313,12 @@ def _core_view(view: View) -> _engine.View:
 
 
 def _with_object_names(text: str, scene: Scene) -> str:
-    """The engine's message, with the mesh's own name for the face that it numbers."""
-    words = text.split("face ")
-    if len(words) < 2 or not words[1].split(",")[0].split(" ")[0].strip(".").isdigit():
-        return text
-    face = int(words[1].split(",")[0].split(" ")[0].strip("."))
-    material = scene.materials[int(scene.mesh.face_material[face])].name
-    owner = scene.mesh.objects[scene.mesh.face_object[face]]
-    return f"{text} (face {face} belongs to object {owner!r}, material {material!r})"
+    """The engine's message, with the scene's own names for the faces and the material that it numbers."""
+    names = []
+    for face in dict.fromkeys(int(number) for number in re.findall(r"\bface (\d+)", text)):
+        material = scene.materials[int(scene.mesh.face_material[face])].name
+        owner = scene.mesh.objects[scene.mesh.face_object[face]]
+        names.append(f"face {face} belongs to object {owner!r}, material {material!r}")
+    for material_index in dict.fromkeys(int(number) for number in re.findall(r"\bmaterial (\d+)", text)):
+        names.append(f"material {material_index} is {scene.materials[material_index].name!r}")
+    return f"{text} ({'; '.join(names)})" if names else text

@@ -23,7 +23,7 @@ def camera_cases() -> list[Case]:
         _case("camera in a wall, looking along it", (0.0, y, 1.5), (0.0, 0.0, 1.0)),
         _case("camera inside a solid", (2.0, 1.2, 0.8), (2.0, 4.0, 0.5)),
         _case("camera 1 mm before a surface", (x - 1e-3, 2.5, 1.0), (x, 2.5, 0.9)),
-        _case("camera 1 micrometre before a surface", (x - 1e-6, 2.5, 1.0), (x, 2.5, 0.9)),
+        _case("camera 1 micrometre before a surface", (x - 1e-6, 2.5, 1.0), (x, 2.5, 1.0)),
         _case("camera 1 mm above a sunlit floor", (2.0, 3.0, 1e-3), (2.0, 0.0, 0.0)),
         _case("camera on the pane", (2.0, 0.0, 1.7), (2.0, 4.0, 0.5)),
         _case("camera outdoors", (2.0, -3.0, 1.7), (2.0, 4.0, 1.0)),

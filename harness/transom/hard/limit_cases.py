@@ -89,7 +89,7 @@ def _reflectances() -> list[Case]:
         )
         cases.append(Case(f"closed furnace of reflectance {rho:g}", GROUP, (claim, *room_claims(lit))))
     for rho in (1.0, 0.9999, 1.5, -0.1):
-        words = ("reflectance", f"{rho:g}", "scene.toml", "wall")
+        words = ("reflectance", f"{rho:g}", "0..0.999", "scene.toml", "wall")
         cases.append(Case(f"reflectance {rho:g}", GROUP, (refused("refused", lambda r=rho: Lit(furnace(r)).engine, words),)))
     return cases
 

@@ -28,9 +28,10 @@ SUN = (0.3, -1.0, 0.7)
 def shape_cases() -> list[Case]:
     room = windowed_room()
     return [
-        _solved("rug in the plane of the floor", with_rug(0.0)),
-        _solved("rug 1 micrometre above the floor", with_rug(1e-6)),
-        _solved("rug 20 micrometres above the floor", with_rug(2e-5)),
+        *(
+            _refused_by_engine(f"rug {name} the floor", with_rug(height), ("rug", "room", "in the plane of", "Delete"))
+            for name, height in (("in the plane of", 0.0), ("1 micrometre above", 1e-6), ("20 micrometres above", 2e-5))
+        ),
         _solved("rug 0.1 mm above the floor", with_rug(1e-4)),
         _solved("rug 1 mm above the floor", with_rug(1e-3)),
         _solved("box standing on the floor", room.with_polygons(*box((1.5, 1.5, 0.0), (2.5, 2.5, 0.7)))),
@@ -65,7 +66,12 @@ def shape_cases() -> list[Case]:
         ),
         _solved("T-junctions", t_junction_room()),
         _solved("open sheet", room.with_polygons(_sheet(1.0), quad(*_sheet(1.8).corners, object="second"))),
-        _solved("box without a lid", room.with_polygons(*box((1.5, 1.5, 0.0), (2.5, 2.5, 0.7), without=("z1",)))),
+        _solved("box without a lid", room.with_polygons(*box((1.5, 1.5, 0.2), (2.5, 2.5, 0.7), without=("z1",)))),
+        _refused_by_engine(
+            "box without a lid, its bottom in the floor",
+            room.with_polygons(*box((1.5, 1.5, 0.0), (2.5, 2.5, 0.7), without=("z1",))),
+            ("box", "room", "in the plane of"),
+        ),
         _solved(
             "inside-out box", room.with_polygons(*box((1.5, 1.5, 0.3), (2.5, 2.5, 0.7), inward=True))
         ),
@@ -189,8 +195,10 @@ def _refused() -> list[Case]:
     return [
         _error("duplicated triangle", twice, ("mesh.obj", "copy", "lies exactly on", "sail", "Delete")),
         _error("triangle and its back", back, ("mesh.obj", "back", "lies exactly on", "sail", "Delete")),
-        _error("triangle on half of a quad", halves, ("mesh.obj", "cloth", "table", "Delete")),
-        _error("square of two triangles on one cut the other way", unlike, ("mesh.obj", "cloth", "table", "Delete")),
+        _refused_by_engine("triangle on half of a quad", halves, ("cloth", "table", "in the plane of", "Delete")),
+        _refused_by_engine(
+            "square of two triangles on one cut the other way", unlike, ("cloth", "table", "in the plane of", "Delete")
+        ),
         _error("triangle without area", flat, ("mesh.obj", "wire", "no area", "Delete")),
         _error("triangle that is a point", point, ("mesh.obj", "dot", "no area", "Delete")),
         _error("missing wall", open_wall, ("mesh.obj", "open wall", "Close the wall")),
@@ -206,3 +214,7 @@ def _error(name: str, room: Room, words: Sequence[str]) -> Case:
     return Case(name, GROUP, (refused("refused", room.load, words),))
 
 
+
+
+def _refused_by_engine(name: str, room: Room, words: Sequence[str]) -> Case:
+    return Case(name, GROUP, (refused("refused", lambda: Lit(room).engine, ("scene.toml", *words)),))
