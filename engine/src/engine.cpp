@@ -54,7 +54,9 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
     facts_.maximum_edge_m = *std::min_element(edges.begin(), edges.end());
     mesh_ = std::make_unique<LightMesh>(faces_, edges, options_.elements_per_edge);
     gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_);
-    direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources);
+    const float element_edge = facts_.maximum_edge_m / static_cast<float>(options_.elements_per_edge);
+    direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources, scene_.materials,
+                                                  element_edge * element_edge);
   }
   std::vector<GatherRow> rows;
   std::vector<int> divisions;
