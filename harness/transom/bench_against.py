@@ -104,25 +104,27 @@ def compare_builds(
     rounds: int,
     patches: int,
     size: tuple[int, int],
+    only: Sequence[str],
     progress: CaseProgress,
 ) -> SpeedComparison:
     """Builds revision `against` and `of` (None: the working tree) and compares their speed on a scene folder.
 
-    progress: of four cases: builds, rounds, second builds, second rounds. Raises InputError for what cannot be built
-    or timed.
+    only: quantities to time; none: all. Raises InputError for what cannot be built or timed.
     """
     load = os.getloadavg()[0]
     setup = {"scene": str(scene), "patches": patches, "width": size[0], "height": size[1]}
+    request = [entry for entry in REQUEST if not only or entry[0] in only]
     with workshop() as folder:
         base, ours = check_out(against, folder), check_out(of, folder, "--of")
-        first = _fresh_comparison(base, ours, folder / "first", setup, REQUEST, rounds, progress)
+        first = _fresh_comparison(base, ours, folder / "first", setup, request, rounds, progress)
         changes = {name: speed_change(times, len(first.times)) for name, times in first.times.items()}
         suspects = [name for name, change in changes.items() if change.looks_slower()]
         second, again = None, {}
         if suspects:
             wanted = {name.split("/")[0] for name in suspects}
-            request = [entry for entry in REQUEST if entry[0] in wanted]
-            second = _fresh_comparison(base, ours, folder / "second", setup, request, rounds, progress)
+            again_request = [entry for entry in request if entry[0] in wanted]
+            progress.total_cases += 2
+            second = _fresh_comparison(base, ours, folder / "second", setup, again_request, rounds, progress)
             again = {name: speed_change(second.times[name], len(suspects)) for name in suspects if name in second.times}
     rows = [
         SpeedRow(
@@ -158,17 +160,18 @@ def measure(
     note: Callable[[int, int], None],
     rng: random.Random,
 ) -> Measured:
-    """Times base, control and ours in each of `rounds` rounds, in random order, in processes that are renewed."""
+    """Times base, control and ours in each of `rounds` rounds, in random order, in processes that are renewed.
+
+    Of a quantity's repeats in a round the least counts: load only ever adds.
+    """
     samples: list[list[dict[str, float]]] = [[], [], []]
     done = 0
     while done < rounds:
         with ExitStack() as stack:
             workers = start(stack)
             for _ in range(min(GENERATION_ROUNDS, rounds - done)):
-                order = [0, 1, 2]
-                rng.shuffle(order)
-                for which in order:
-                    samples[which].append(workers[which].times(request))
+                for entries, found in zip(samples, _round(workers, request, rng), strict=True):
+                    entries.append(found)
                 done += 1
                 note(done, rounds)
     base, control, ours = samples
@@ -229,6 +232,21 @@ def _fresh_comparison(
     measured = measure(start, request, rounds, progress.update, random.Random(ORDER_SEED))
     progress.finish(f"{rounds} rounds")
     return measured
+
+
+def _round(
+    workers: tuple[Timed, Timed, Timed], request: Sequence[tuple[str, int]], rng: random.Random
+) -> list[dict[str, float]]:
+    """One time of everything for each worker. They take turns at every repeat, so that what load there is meets all."""
+    least: list[dict[str, float]] = [{}, {}, {}]
+    for quantity, repeats in request:
+        for _ in range(repeats):
+            order = [0, 1, 2]
+            rng.shuffle(order)
+            for which in order:
+                found = workers[which].times([(quantity, 1)])
+                least[which] |= {name: min(value, least[which].get(name, value)) for name, value in found.items()}
+    return least
 
 
 def _start_workers(

@@ -266,6 +266,11 @@ def _check_sensors(points: Float64, normals: Float64, scene: Scene) -> None:
     )
 
 
+def build_description() -> str:
+    """Compiler, flags and libraries of the compiled engine."""
+    return str(_engine.build_description())
+
+
 def _triple(vector: Float64) -> tuple[float, float, float]:
     x, y, z = (float(v) for v in vector)
     return x, y, z

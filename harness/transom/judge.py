@@ -48,6 +48,7 @@ Quantity = Literal[
     "crosscheck_image_percent",
     "crosscheck_sensor_percent",
     "baseline_percent",
+    "baseline_seed_percent",
     "sun_edge_mm",
     "energy_percent",
     "broken_claims",

@@ -10,7 +10,8 @@ from rich.console import Console
 from transom.comparison import COMPARISON_FORMAT, Comparison, read_comparison
 from transom.files import write_atomic
 from transom.judge import Missing, Outcome, ToleranceFile, Verdict, exit_code, judge, read_tolerances
-from transom.report.content import Content, Pictures, engine_source, make_content
+from transom.report.checks import read_check
+from transom.report.content import Content, Pictures, make_content
 from transom.report.day import day_cases, find_day, render_day
 from transom.report.junit import junit_xml
 from transom.report.notes import read_notes
@@ -57,8 +58,9 @@ def write_report(output: Path, build: Path, *, render: bool = True) -> int:
         day=find_day(cases),
         figure_13=[],
     )
-    speed = read_speed(build, dict.fromkeys(timing.scene for timing in timings), engine_source(results))
-    content = make_content(results, view_images(suites, results), pictures, speed, _tolerances(), notes)
+    speed = read_speed(build, _judged_scenes(suites))
+    images, checked = view_images(suites, results), read_check(build / "check" / "check.json")
+    content = make_content(results, images, pictures, speed, _tolerances(), notes, checked)
     write_files(output, content, judged)
     return exit_code(verdict for _, verdicts in judged for verdict in verdicts)
 
@@ -95,10 +97,15 @@ def _tolerances() -> ToleranceFile:
 
 def _timings(suites: Sequence[Suite], build: Path, note: Callable[[str], None]) -> list[Timing]:
     """Times every scene that is judged against Mitsuba."""
-    names = {case.scene.name: None for suite in suites if suite.reference == "mitsuba" for case in suite.cases}
-    timings = time_scenes(list(names), lambda name: note(f"Timing {name}"))
+    timings = time_scenes(_judged_scenes(suites), lambda name: note(f"Timing {name}"))
     write_timings(_timings_file(build), timings)
     return timings
+
+
+def _judged_scenes(suites: Sequence[Suite]) -> list[str]:
+    """Scenes that are judged against Mitsuba, by name."""
+    names = {case.scene.name: None for suite in suites if suite.reference == "mitsuba" for case in suite.cases}
+    return list(names)
 
 
 def _timings_file(build: Path) -> Path:

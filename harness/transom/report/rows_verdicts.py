@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from transom.check import Checked
 from transom.judge import Outcome, Tolerance, ToleranceFile, Verdict, tolerance_debt
 from transom.report.junit import reproduce_command
 from transom.report.numbers import fixed, words
@@ -209,6 +210,36 @@ def debt(tolerances: ToleranceFile) -> Table:
     ]
     head = ("Quantity", "Where", "Tolerance", "General tolerance", "Times looser", "Reason")
     return Table("tolerance_debt", "Tolerance debt", head, tuple(rows), "")
+
+
+def baseline(checked: Sequence[Checked]) -> Table:
+    """Each measure against its blessed value, what did not pass first. Without reference noise, so that drift shows."""
+    found = [
+        (drift, verdict, suite)
+        for suite in checked
+        for drift, verdict in zip(suite.drifts, suite.baseline_verdicts, strict=False)
+    ]
+    found.sort(key=lambda entry: (WORST_FIRST.index(entry[1].outcome), -abs(entry[0].difference)))
+    rows = []
+    for drift, verdict, suite in found:
+        cells = (
+            Cell(verdict.outcome, kind="verdict"),
+            Cell(drift.case),
+            Cell(f"{words(drift.category)}, {drift.place}" if drift.place else words(drift.category)),
+            _significant(drift.before),
+            _significant(drift.now),
+            signed_number(drift.difference, 3),
+            number(drift.uncertainty, 3),
+            _maybe(verdict.tolerance, 2),
+        )
+        source = f"{suite.suite}, {suite.blessed}, seed {suite.seed or 'default'}"
+        rows.append(Row(cells, source))
+    head = ("Verdict", "Case", "Measure", "Blessed", "Now", "Difference [%]", "u [%]", "Tolerance [%]")
+    return Table("baseline", "Against the blessed baseline", head, tuple(rows), "transom check")
+
+
+def _significant(value: float | None) -> Cell:
+    return Cell("absent", kind="muted") if value is None else Cell(f"{value:.5g}", value)
 
 
 def _judged_by(rule: Tolerance, results: Results) -> list[Any]:
