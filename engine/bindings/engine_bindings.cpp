@@ -77,7 +77,9 @@ NB_MODULE(_engine, m) {
              limit.control = std::make_unique<oneapi::tbb::global_control>(
                  oneapi::tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(limit.count));
            })
-      .def("__exit__", [](ThreadLimit& limit, const nb::args&) { limit.control.reset(); });
+      .def(
+          "__exit__", [](ThreadLimit& limit, nb::object, nb::object, nb::object) { limit.control.reset(); },
+          "kind"_a.none(), "error"_a.none(), "trace"_a.none());
 
   nb::class_<OpeningGroup>(m, "OpeningGroup")
       .def(nb::init<>())

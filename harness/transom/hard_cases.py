@@ -45,7 +45,9 @@ def chosen_cases(suite: Suite) -> Iterator[Case]:
     for group in suite.known:
         if group not in GROUPS:
             remedy = f"Choose from {', '.join(GROUPS)}"
-            raise InputError("is no group of hard cases", field=f"suites.{suite.name}.known", value=group, remedy=remedy)
+            raise InputError(
+                "is no group of hard cases", field=f"suites.{suite.name}.known", value=group, remedy=remedy
+            )
         yield from GROUPS[group]()
 
 

@@ -156,7 +156,5 @@ def _moved(old: Scene, matrix: Float64, by: Float64) -> Scene:
         views=tuple(
             replace(v, position=point(v.position), target=point(v.target), up=direction(v.up)) for v in old.views
         ),
-        sensors=tuple(
-            replace(s, points=s.points @ matrix.T + by, normals=s.normals @ linear.T) for s in old.sensors
-        ),
+        sensors=tuple(replace(s, points=s.points @ matrix.T + by, normals=s.normals @ linear.T) for s in old.sensors),
     )

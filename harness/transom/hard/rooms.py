@@ -145,10 +145,7 @@ def box(
 
 def frame(outer: Points, inner: Points, material: str = "wall", object: str = "room") -> list[Polygon]:  # noqa: A002
     """The ring between two quads with corners in the same order: four faces without T-junctions."""
-    return [
-        quad(outer[k], outer[(k + 1) % 4], inner[(k + 1) % 4], inner[k], material, object)
-        for k in range(4)
-    ]
+    return [quad(outer[k], outer[(k + 1) % 4], inner[(k + 1) % 4], inner[k], material, object) for k in range(4)]
 
 
 def shell(size: Point = ROOM_M, without: Sequence[str] = ("y0",), material: str = "wall") -> list[Polygon]:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from transom.daylight.condition import Condition
 from transom.hard.changes import sunlit
 from transom.hard.claims import Case, Claim, Lit, Seen, close, conserving, finite, methods_agree, refused, room_claims
 from transom.hard.rooms import (
@@ -15,7 +16,6 @@ from transom.hard.rooms import (
     Polygon,
     Room,
     box,
-
     quad,
     shell,
     windowed_room,
@@ -65,16 +65,14 @@ def shape_cases() -> list[Case]:
             room.with_polygons(Polygon(((0.5, 2.0, 1.0), (3.5, 2.0, 1.0), (2.0, 2.0001, 1.0)), "wall", "needle")),
         ),
         _solved("T-junctions", t_junction_room()),
-        _solved("open sheet", room.with_polygons(_sheet(1.0), quad(*_sheet(1.8).corners, object="second"))),
+        _solved("open sheet", room.with_polygons(_sheet(1.0), _sheet(1.8))),
         _solved("box without a lid", room.with_polygons(*box((1.5, 1.5, 0.2), (2.5, 2.5, 0.7), without=("z1",)))),
         _refused_by_engine(
             "box without a lid, its bottom in the floor",
             room.with_polygons(*box((1.5, 1.5, 0.0), (2.5, 2.5, 0.7), without=("z1",))),
             ("box", "room", "in the plane of"),
         ),
-        _solved(
-            "inside-out box", room.with_polygons(*box((1.5, 1.5, 0.3), (2.5, 2.5, 0.7), inward=True))
-        ),
+        _solved("inside-out box", room.with_polygons(*box((1.5, 1.5, 0.3), (2.5, 2.5, 0.7), inward=True))),
         _louvres(),
         _smooth(),
         *_refused(),
@@ -112,9 +110,7 @@ def t_junction_room() -> Room:
     """Walls cut at heights that their neighbours do not share."""
     x, y, z = ROOM_M
     kept = shell(without=("y0", "x0", "x1"))
-    west = [
-        quad((0.0, 0.0, a), (0.0, y, a), (0.0, y, b), (0.0, 0.0, b)) for a, b in ((0.0, 0.7), (0.7, 1.9), (1.9, z))
-    ]
+    west = [quad((0.0, 0.0, a), (0.0, y, a), (0.0, y, b), (0.0, 0.0, b)) for a, b in ((0.0, 0.7), (0.7, 1.9), (1.9, z))]
     east = [
         quad((x, a, 0.0), (x, a, z), (x, b, z), (x, b, 0.0)) for a, b in ((0.0, 1.1), (1.1, 3.3333333), (3.3333333, y))
     ]
@@ -146,9 +142,7 @@ def column_room(smooth: bool, tilt_deg: float = 0.0, sides: int = 16) -> Room:
     tilt = math.radians(tilt_deg)
     for k in range(sides):
         a, b = 2 * math.pi * k / sides, 2 * math.pi * (k + 1) / sides
-        (xa, ya), (xb, yb) = (
-            (centre[0] + radius * math.cos(t), centre[1] + radius * math.sin(t)) for t in (a, b)
-        )
+        (xa, ya), (xb, yb) = ((centre[0] + radius * math.cos(t), centre[1] + radius * math.sin(t)) for t in (a, b))
         normals: list[Point] = [(math.cos(t + tilt), math.sin(t + tilt), 0.0) for t in (a, b)]
         corners = ((xa, ya, low), (xb, yb, low), (xb, yb, high), (xa, ya, high))
         shading = (normals[0], normals[1], normals[1], normals[0]) if smooth else ()
@@ -158,7 +152,7 @@ def column_room(smooth: bool, tilt_deg: float = 0.0, sides: int = 16) -> Room:
 
 
 def _smooth() -> Case:
-    def light(condition):  # type: ignore[no-untyped-def]
+    def light(condition: Condition) -> Condition:
         return sunlit(condition, SUN)
 
     smooth, facets = Lit(column_room(True), light), Lit(column_room(False), light)
@@ -212,8 +206,6 @@ def _refused() -> list[Case]:
 
 def _error(name: str, room: Room, words: Sequence[str]) -> Case:
     return Case(name, GROUP, (refused("refused", room.load, words),))
-
-
 
 
 def _refused_by_engine(name: str, room: Room, words: Sequence[str]) -> Case:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 from transom.daylight import resolve_condition
 from transom.daylight.condition import Condition
@@ -80,7 +81,7 @@ def _clock_cases() -> list[Case]:
         altitude = value(
             "altitude",
             f"the sun stands at {altitude_deg:g} degrees",
-            lambda lit=lit: math.degrees(lit.condition.sun.altitude_rad),
+            partial(_altitude_deg, lit),
             altitude_deg - 0.5,
             altitude_deg + 0.5,
         )
@@ -88,9 +89,7 @@ def _clock_cases() -> list[Case]:
     night = replace(windowed_room(), condition=f'time = "2026-03-21T00:00"\n{sunny}')
     cases.append(Case("sun below the horizon, clear sky", GROUP, (_dark(night), *room_claims(Lit(night)))))
     overcast = 'time = "2026-03-21T00:00"\nsky = "overcast"\ndiffuse_horizontal_illuminance_lx = 5000'
-    cases.append(
-        Case("sun below the horizon, overcast", GROUP, room_claims(Lit(replace(night, condition=overcast))))
-    )
+    cases.append(Case("sun below the horizon, overcast", GROUP, room_claims(Lit(replace(night, condition=overcast)))))
     impossible = 'time = "2026-03-21T00:00"\nsky = "cie:12"\ndirect_normal_illuminance_lx = 50000'
     cases.append(
         Case(
@@ -106,6 +105,10 @@ def _clock_cases() -> list[Case]:
         )
     )
     return cases
+
+
+def _altitude_deg(lit: Lit) -> float:
+    return math.degrees(lit.condition.sun.altitude_rad)
 
 
 def first_condition(scene: Scene) -> Condition:
