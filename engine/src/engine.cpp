@@ -48,7 +48,7 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
     sky_index_ = std::make_unique<SkyBinIndex>(sky_bins);
     const std::vector<char> is_indoors =
         survey_interior(scene_, *rays_, faces_, hash_seed(options_.seed, kSurveyStream));
-    check_overlaps(faces_, is_indoors);
+    check_overlaps(faces_, is_indoors, *rays_);
     const std::vector<float> edges =
         choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
     facts_.maximum_edge_m = *std::min_element(edges.begin(), edges.end());
@@ -199,10 +199,26 @@ void Engine::mark_interior(const std::vector<GatherRow>& rows) {
   for (const int slot : unseen_slots_) mark(patch_of_slot_[slot]);
   if (!scene_.point_sources.empty())
     for (std::size_t p = 0; p < rows.size(); ++p) mark(static_cast<int>(p));
+  // What a patch indoors sees is indoors if it sees a patch indoors itself. One ray that slips through an edge, between
+  // slivers, meets the outside of a wall, which does not look back.
+  const auto patch_at = [&](const Share& share) { return patch_of_slot_[share.index / mesh_->elements_per_slot()]; };
+  std::vector<int> pending;
   while (!stack.empty()) {
     const int patch = stack.back();
     stack.pop_back();
-    for (const Share& share : rows[patch].reached) mark(patch_of_slot_[share.index / mesh_->elements_per_slot()]);
+    for (const Share& share : rows[patch].reached)
+      if (patch_at(share) >= 0 && !is_interior_[patch_at(share)]) pending.push_back(patch_at(share));
+    if (!stack.empty()) continue;
+    std::sort(pending.begin(), pending.end());
+    pending.erase(std::unique(pending.begin(), pending.end()), pending.end());
+    std::erase_if(pending, [&](int other) {
+      const std::vector<Share>& seen = rows[other].reached;
+      if (std::none_of(seen.begin(), seen.end(),
+                       [&](const Share& share) { return patch_at(share) >= 0 && is_interior_[patch_at(share)]; }))
+        return false;
+      mark(other);
+      return true;
+    });
   }
   facts_.interior_patch_count = static_cast<int>(std::count(is_interior_.begin(), is_interior_.end(), 1));
 }

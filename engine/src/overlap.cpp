@@ -6,13 +6,16 @@
 #include <sstream>
 
 #include "transom/error.h"
+#include "transom/sampling.h"
 
 namespace transom {
 namespace {
 
 constexpr float kParallelCosine = 0.99999f;  // of the normals of faces in one plane
 constexpr double kLeastShare = 1e-3;         // of the smaller face's area: less is the rounding of neighbours
-constexpr double kLeastExtent2 = 1e-7;       // of the scene's extent squared: less cannot matter
+constexpr double kLeastExtent2 = 1e-5;       // of the scene's extent squared: a strip as wide as the lift of rays
+constexpr std::uint32_t kRayCount = 16;
+constexpr std::uint32_t kSeed = 1;  // of a check: the same scene is always right or wrong
 
 struct Box {
   glm::vec3 low, high;
@@ -60,20 +63,31 @@ double overlap_area(const Face& face, const Face& other, glm::dvec3& middle) {
   return 0.5 * glm::length(twice_area);
 }
 
-// Whether light indoors comes from a direction that neither face has a solid on.
-bool share_a_lit_side(const Faces& faces, const std::vector<char>& is_indoors, int a, int b) {
-  const bool same_way = glm::dot(faces.faces[a].normal, faces.faces[b].normal) > 0;
-  for (Side side = 0; side < 2; ++side) {
-    const Side other = same_way ? side : 1 - side;
-    const bool is_lit = (is_indoors[a] >> side & 1) || (is_indoors[b] >> other & 1);
-    if (is_lit && !faces.is_inside_solid(a, side) && !faces.is_inside_solid(b, other)) return true;
+// Whether a place between two faces that lie on each other sees a lit side indoors, to the front or the back of one.
+bool is_lit(const Faces& faces, const std::vector<char>& is_indoors, const RayScene& rays, glm::vec3 place,
+            glm::vec3 normal) {
+  const SobolSequence points(kSeed);
+  for (const glm::vec3 up : {normal, -normal}) {
+    Ray own[kRayCount];
+    Hit hits[kRayCount];
+    for (std::uint32_t k = 0; k < kRayCount; ++k)
+      own[k] = {place + 2 * faces.ray_offset() * up,
+                frame_from_normal(up) * sample_cosine_hemisphere(points.point2(k))};
+    rays.intersect(RayScene::What::kAll, own, hits);
+    bool is_buried = false, sees_light = false;
+    for (const Hit& hit : hits) {
+      if (hit.face < 0) continue;
+      is_buried |= faces.is_inside_solid(hit.face, hit.side);
+      sees_light |= (is_indoors[hit.face] >> hit.side & 1) != 0;
+    }
+    if (sees_light && !is_buried) return true;
   }
   return false;
 }
 
 }  // namespace
 
-void check_overlaps(const Faces& faces, const std::vector<char>& is_indoors) {
+void check_overlaps(const Faces& faces, const std::vector<char>& is_indoors, const RayScene& rays) {
   const float margin = faces.ray_offset();
   const std::size_t count = faces.faces.size();
   std::vector<Box> boxes;
@@ -93,14 +107,15 @@ void check_overlaps(const Faces& faces, const std::vector<char>& is_indoors) {
           std::abs(glm::dot(first.normal, second.normal)) < kParallelCosine)
         continue;
       const auto off_plane = [&](glm::vec3 p) { return std::abs(glm::dot(p - first.corner[0], first.normal)); };
-      const float distance = std::max(
-          {off_plane(second.corner[0]), off_plane(second.corner[1]), off_plane(second.corner[corner_count(second) - 1])});
-      if (distance > margin || !share_a_lit_side(faces, is_indoors, a, b)) continue;
+      const float distance = std::max({off_plane(second.corner[0]), off_plane(second.corner[1]),
+                                       off_plane(second.corner[corner_count(second) - 1])});
+      if (distance > margin) continue;
       glm::dvec3 middle(0);
       const double area = overlap_area(second, first, middle);
-      if (area <= std::max(kLeastShare * std::min(first.area, second.area),
-                           kLeastExtent2 * faces.extent * faces.extent))
+      if (area <=
+          std::max(kLeastShare * std::min(first.area, second.area), kLeastExtent2 * faces.extent * faces.extent))
         continue;
+      if (!is_lit(faces, is_indoors, rays, glm::vec3(middle), first.normal)) continue;
       middle += faces.origin;
       const auto [low, high] = std::minmax(first.source, second.source);
       std::ostringstream text;

@@ -324,6 +324,6 @@ def _with_object_names(text: str, scene: Scene) -> str:
         material = scene.materials[int(scene.mesh.face_material[face])].name
         owner = scene.mesh.objects[scene.mesh.face_object[face]]
         names.append(f"face {face} belongs to object {owner!r}, material {material!r}")
-    for material_index in dict.fromkeys(int(number) for number in re.findall(r"\bmaterial (\d+)", text)):
-        names.append(f"material {material_index} is {scene.materials[material_index].name!r}")
+    materials = dict.fromkeys(int(number) for number in re.findall(r"\bmaterial (\d+)", text))
+    names += [f"material {index} is {scene.materials[index].name!r}" for index in materials]
     return f"{text} ({'; '.join(names)})" if names else text

@@ -35,8 +35,8 @@ class SuiteEntry(BaseModel):
 
     width: pictures are this wide and keep their view's proportions; omitted: the view's own size.
     reference: who knows the truth. layout: how a report shows it, view by view or as a grid of hours.
-    report: whether the report runs it. known: cases with a known answer that are drawn in code (transom.known.suite), or
-    groups of hard cases (transom.hard_cases).
+    report: whether the report runs it. known: cases with a known answer that are drawn in code (transom.known.suite),
+    or groups of hard cases (transom.hard_cases).
     programs: renderers that a suite of known answers judges.
     """
 

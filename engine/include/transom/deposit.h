@@ -57,7 +57,7 @@ class DirectLight {
   const LightMesh& mesh_;
   const RayScene& rays_;
   std::vector<LocalSource> sources_;
-  std::vector<int> small_openings_;   // faces
+  std::vector<int> small_openings_;     // faces
   std::vector<char> is_small_opening_;  // by face
 };
 

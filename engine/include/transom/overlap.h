@@ -4,12 +4,13 @@
 #include <vector>
 
 #include "transom/geometry.h"
+#include "transom/ray_scene.h"
 
 namespace transom {
 
-/// Throws InputError for two faces indoors that lie in one plane (nearer than the lift of ray origins), overlap, and can
-/// be lit from the same side: which of them light meets would be chance, and both would receive it. Faces of closed
-/// solids that stand on others, or back on to them, are no such pair. is_indoors: by face, see survey.h.
-void check_overlaps(const Faces& faces, const std::vector<char>& is_indoors);
+/// Throws InputError for two faces indoors that lie in one plane (nearer than the lift of ray origins), overlap, and
+/// can are lit where they do: which of them light meets would be chance, and both would receive it. A box that stands
+/// on the floor covers it and is no such pair. is_indoors: by face, see survey.h.
+void check_overlaps(const Faces& faces, const std::vector<char>& is_indoors, const RayScene& rays);
 
 }  // namespace transom

@@ -53,7 +53,7 @@ def _case(name: str, camera: Point, target: Point) -> Case:
 
 
 def _touching(name: str, camera: Point, target: Point) -> Case:
-    """Cameras at a vertex of the mesh: which of its faces they see has no answer, so that the two methods may differ."""
+    """Cameras at a vertex of the mesh: which of its faces they see has no answer, and the two methods may differ."""
     lit = Lit(camera_room(camera, target), lambda condition: sunlit(condition, SUN))
     return Case(name, GROUP, (finite(lit), _parts(lit)))
 

@@ -117,7 +117,7 @@ def tiny_opening_room(side: float, transmittance: float | None = None) -> Room:
 
 def _openings() -> list[Case]:
     tiny = Lit(replace(tiny_opening_room(1e-3), sensors=((2.0, 2.0, 0.8),)), lambda c: replace(c, sun_direction=None))
-    # A sky of 10,000 lx has 10,000 / pi cd/m²; the sensor looks up, the opening stands 0.7 m above and 2 m away from it.
+    # A sky of 10,000 lx has 10,000 / pi cd/m²; the sensor looks up, the opening stands 0.7 m above and 2 m away.
     distance2 = 2.0**2 + 0.7**2
     exact = 1e4 / math.pi * 1e-6 * (0.7 / math.sqrt(distance2)) * (2.0 / math.sqrt(distance2)) / distance2
     share = value(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 from transom.daylight.condition import Condition
 from transom.hard.changes import sunlit
@@ -100,7 +101,7 @@ def sliver_floor_room() -> Room:
     room = windowed_room()
     widths = [x * share for share in (0.0, 1e-4, 2e-4, 0.3, 0.3001, 0.9999, 1.0)]
     apex: Point = (0.0, y, 0.0)
-    fan = [Polygon(((a, 0.0, 0.0), (b, 0.0, 0.0), apex)) for a, b in zip(widths, widths[1:], strict=False)]
+    fan = [Polygon(((a, 0.0, 0.0), (b, 0.0, 0.0), apex)) for a, b in pairwise(widths)]
     fan.append(Polygon(((x, 0.0, 0.0), (x, y, 0.0), apex)))
     floorless = [polygon for polygon in room.polygons if any(z > 0 for _, _, z in polygon.corners)]
     return replace(room, polygons=(*floorless, *fan))

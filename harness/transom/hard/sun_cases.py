@@ -1,4 +1,4 @@
-"""The sun where formulas divide by what vanishes: in planes of panes and walls, at the horizon, overhead, at the poles."""
+"""The sun where formulas divide by what vanishes: in planes of panes and walls, at the horizon, at the poles."""
 
 from __future__ import annotations
 
