@@ -5,6 +5,10 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <oneapi/tbb/global_control.h>
+
+#include <memory>
+
 #include "transom/build.h"
 #include "transom/engine.h"
 #include "transom/error.h"
@@ -46,6 +50,13 @@ struct Session {
       : engine(std::move(scene), bins, options), renderer(engine) {}
 };
 
+// At most so many threads while a `with` block lasts.
+struct ThreadLimit {
+  explicit ThreadLimit(int threads) : count(threads) {}
+  int count;
+  std::unique_ptr<oneapi::tbb::global_control> control;
+};
+
 }  // namespace
 
 NB_MODULE(_engine, m) {
@@ -58,6 +69,17 @@ NB_MODULE(_engine, m) {
   m.def(
       "build_description", [] { return std::string(build_description()); },
       "Compiler, flags and libraries of this build.");
+
+  nb::class_<ThreadLimit>(m, "ThreadLimit", "A `with` block in which the engine uses at most `count` threads.")
+      .def(nb::init<int>(), "count"_a)
+      .def("__enter__",
+           [](ThreadLimit& limit) {
+             limit.control = std::make_unique<oneapi::tbb::global_control>(
+                 oneapi::tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(limit.count));
+           })
+      .def(
+          "__exit__", [](ThreadLimit& limit, nb::object, nb::object, nb::object) { limit.control.reset(); },
+          "kind"_a.none(), "error"_a.none(), "trace"_a.none());
 
   nb::class_<OpeningGroup>(m, "OpeningGroup")
       .def(nb::init<>())

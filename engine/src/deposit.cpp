@@ -1,5 +1,6 @@
 #include "transom/deposit.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "transom/parallel.h"
@@ -10,12 +11,21 @@ namespace {
 
 constexpr int kSamplesPerElement = 4;          // to find out which patches are lit, and wholly or partly
 constexpr int kRefinedSamplesPerElement = 64;  // on patches that are partly lit
+constexpr std::uint32_t kRaysPerSmallOpening = 256;
+constexpr float kGrazingCosine = 1e-3f;  // below it a small opening lets nothing through
 constexpr std::size_t kGrain = 8;
 
 }  // namespace
 
-DirectLight::DirectLight(const LightMesh& mesh, const RayScene& rays, const std::vector<PointSource>& sources)
-    : mesh_(mesh), rays_(rays) {
+DirectLight::DirectLight(const LightMesh& mesh, const RayScene& rays, const std::vector<PointSource>& sources,
+                         const std::vector<Material>& materials, float small_opening_m2)
+    : mesh_(mesh), rays_(rays), is_small_opening_(mesh.faces().faces.size(), 0) {
+  for (std::size_t f = 0; f < is_small_opening_.size(); ++f) {
+    const Face& face = mesh.faces().faces[f];
+    if (materials[face.material].opening < 0 || face.area >= small_opening_m2) continue;
+    small_openings_.push_back(static_cast<int>(f));
+    is_small_opening_[f] = 1;
+  }
   for (const PointSource& source : sources)
     sources_.push_back({glm::vec3(source.position - mesh.faces().origin), source.intensity});
 }
@@ -82,6 +92,7 @@ void DirectLight::deposit_on_slot(const std::vector<Beam>& beams, int slot_index
     const float cosine = glm::dot(beam.direction_to_source, normal);
     if (cosine <= 0 || beam.normal_illuminance == glm::vec3(0)) continue;
     beam_transmission(beam.direction_to_source, points, share);
+    ignore_small_openings(beam.direction_to_source, points, share);
     lightable_count += points.size();
     for (std::size_t i = 0; i < points.size(); ++i) {
       lit_count += share[i] > 0;
@@ -101,6 +112,59 @@ void DirectLight::deposit_on_slot(const std::vector<Beam>& beams, int slot_index
     if (sum[e] != glm::vec3(0)) lit.push_back({slot_index * element_count + e, sum[e] / static_cast<float>(samples)});
 }
 
+// Takes the light away that comes to the points through a small opening first.
+void DirectLight::ignore_small_openings(glm::vec3 direction, std::span<const glm::vec3> points,
+                                        std::span<float> share) const {
+  if (small_openings_.empty()) return;
+  std::vector<Ray> rays;
+  std::vector<std::size_t> index;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (share[i] > 0) {
+      rays.push_back({points[i], direction});
+      index.push_back(i);
+    }
+  std::vector<Hit> hits(rays.size());
+  rays_.intersect(RayScene::What::kOpenings, rays, hits);
+  for (std::size_t k = 0; k < hits.size(); ++k)
+    if (hits[k].face >= 0 && is_small_opening_[hits[k].face]) share[index[k]] = 0;
+}
+
+// Mean illuminance of elements by the light of small openings: equal parts of it from places all over each.
+std::map<int, glm::vec3> DirectLight::send_through_small_openings(const std::vector<Beam>& beams,
+                                                                  std::uint32_t seed) const {
+  std::map<int, glm::vec3> sent;
+  std::vector<glm::vec3> places(kRaysPerSmallOpening);
+  std::vector<float> share(kRaysPerSmallOpening);
+  std::vector<Ray> onwards(kRaysPerSmallOpening);
+  std::vector<Hit> hits(kRaysPerSmallOpening);
+  for (const int f : small_openings_)
+    for (const Beam& beam : beams) {
+      const Face& face = mesh_.faces().faces[f];
+      const float cosine = glm::dot(face.normal, beam.direction_to_source);
+      if (std::abs(cosine) < kGrazingCosine) continue;
+      // Off the face along the beam, not along the normal: the way back to the sun is then through that place of it.
+      const glm::vec3 beyond = -mesh_.faces().ray_offset() / std::abs(cosine) * beam.direction_to_source;
+      const SobolSequence points(hash_seed(seed, static_cast<std::uint64_t>(f)));
+      for (std::uint32_t i = 0; i < kRaysPerSmallOpening; ++i) {
+        const glm::vec2 u = points.point2(i);
+        places[i] = face.position(face.is_quad ? u : sample_triangle(u)) + beyond;
+        onwards[i] = {places[i], -beam.direction_to_source};
+      }
+      beam_transmission(beam.direction_to_source, places, share);
+      rays_.intersect(RayScene::What::kAll, onwards, hits);
+      const float flux_share = face.area * std::abs(cosine) / static_cast<float>(kRaysPerSmallOpening);
+      for (std::size_t i = 0; i < hits.size(); ++i) {
+        const Hit& hit = hits[i];
+        if (share[i] <= 0 || hit.face < 0 || mesh_.faces().is_inside_solid(hit.face, hit.side)) continue;
+        const int element = mesh_.element_at(hit), per_slot = mesh_.elements_per_slot();
+        const Slot slot = mesh_.slot(element / per_slot);
+        const float area = mesh_.element_area(slot.face, slot.cell, element % per_slot);
+        if (area > 0) sent[element] += beam.normal_illuminance * (share[i] * flux_share / area);
+      }
+    }
+  return sent;
+}
+
 std::vector<LitElement> DirectLight::deposit(const std::vector<Beam>& beams, const std::vector<int>& slots,
                                              std::uint32_t seed) const {
   std::vector<LitElement> lit;
@@ -113,6 +177,19 @@ std::vector<LitElement> DirectLight::deposit(const std::vector<Beam>& beams, con
     by_slot[i].clear();
     deposit_on_slot(beams, slots[i], kRefinedSamplesPerElement, seed, is_mixed, by_slot[i]);
   });
+  const std::map<int, glm::vec3> sent = send_through_small_openings(beams, seed);
+  for (std::size_t i = 0; i < slots.size() && !sent.empty(); ++i) {
+    const int first = slots[i] * mesh_.elements_per_slot(), last = first + mesh_.elements_per_slot();
+    for (auto entry = sent.lower_bound(first); entry != sent.end() && entry->first < last; ++entry) {
+      const int element = entry->first;
+      const auto known = std::find_if(by_slot[i].begin(), by_slot[i].end(),
+                                      [element](const LitElement& e) { return e.element == element; });
+      if (known == by_slot[i].end())
+        by_slot[i].push_back({element, entry->second});
+      else
+        known->illuminance += entry->second;
+    }
+  }
   for (const std::vector<LitElement>& part : by_slot) lit.insert(lit.end(), part.begin(), part.end());
   return lit;
 }

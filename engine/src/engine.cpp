@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "transom/error.h"
+#include "transom/overlap.h"
 #include "transom/parallel.h"
 #include "transom/sampling.h"
 #include "transom/survey.h"
@@ -31,7 +32,8 @@ enum Stream : std::uint64_t {
   kSensorStream,
   kAuditStream,
   kSurveyStream,
-  kSourceStream
+  kSourceStream,
+  kUnseenStream = 1u << 20
 };
 
 }  // namespace
@@ -46,19 +48,24 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
     sky_index_ = std::make_unique<SkyBinIndex>(sky_bins);
     const std::vector<char> is_indoors =
         survey_interior(scene_, *rays_, faces_, hash_seed(options_.seed, kSurveyStream));
+    check_overlaps(faces_, is_indoors, *rays_);
     const std::vector<float> edges =
         choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
     facts_.maximum_edge_m = *std::min_element(edges.begin(), edges.end());
     mesh_ = std::make_unique<LightMesh>(faces_, edges, options_.elements_per_edge);
     gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_);
-    direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources);
+    const float element_edge = facts_.maximum_edge_m / static_cast<float>(options_.elements_per_edge);
+    direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources, scene_.materials,
+                                                  element_edge * element_edge);
   }
   std::vector<GatherRow> rows;
   std::vector<int> divisions;
   {
     const TracePhase phase(trace_, "patches");
-    find_patches(first_slots(), rows);
+    patch_of_slot_.assign(static_cast<std::size_t>(mesh_->slot_count()), -1);
+    find_patches(first_wave(), rows);
     mark_interior(rows);
+    find_unseen_patches(rows);
     check_closed(rows);
   }
   {
@@ -102,11 +109,10 @@ std::vector<int> Engine::first_slots() const {
   return slots;
 }
 
-// Rows wave by wave: what a patch sees becomes a patch in the next wave, until nothing new is seen.
-void Engine::find_patches(const std::vector<int>& first, std::vector<GatherRow>& rows) {
-  patch_of_slot_.assign(static_cast<std::size_t>(mesh_->slot_count()), -1);
+// Where the search for patches starts: first_slots, and what point sources light.
+std::vector<int> Engine::first_wave() const {
   const int per_slot = mesh_->elements_per_slot();
-  std::vector<int> wave = first;
+  std::vector<int> wave = first_slots();
   for (std::size_t i = 0; i < scene_.point_sources.size(); ++i) {
     const SobolSequence points(hash_seed(options_.seed, kSourceStream + i));
     std::vector<Ray> rays;
@@ -124,7 +130,12 @@ void Engine::find_patches(const std::vector<int>& first, std::vector<GatherRow>&
   }
   std::sort(wave.begin(), wave.end());
   wave.erase(std::unique(wave.begin(), wave.end()), wave.end());
+  return wave;
+}
 
+// Rows wave by wave: what a patch sees becomes a patch in the next wave, until nothing new is seen.
+void Engine::find_patches(std::vector<int> wave, std::vector<GatherRow>& rows) {
+  const int per_slot = mesh_->elements_per_slot();
   while (!wave.empty()) {
     for (const int slot : wave) {
       patch_of_slot_[slot] = static_cast<int>(slot_of_patch_.size());
@@ -144,6 +155,20 @@ void Engine::find_patches(const std::vector<int>& first, std::vector<GatherRow>&
     std::sort(next.begin(), next.end());
     next.erase(std::unique(next.begin(), next.end()), next.end());
     wave = std::move(next);
+  }
+}
+
+// Slots that see patches indoors without having been seen by them: then those are indoors, too.
+void Engine::find_unseen_patches(std::vector<GatherRow>& rows) {
+  for (std::uint64_t round = 0;; ++round) {
+    std::vector<char> is_interior(patch_of_slot_.size(), 0);
+    for (std::size_t p = 0; p < rows.size(); ++p) is_interior[slot_of_patch_[p]] = is_interior_[p];
+    const std::vector<int> unseen =
+        slots_that_see(is_interior, patch_of_slot_, *mesh_, *rays_, hash_seed(options_.seed, kUnseenStream + round));
+    if (unseen.empty()) return;
+    find_patches(unseen, rows);
+    unseen_slots_.insert(unseen_slots_.end(), unseen.begin(), unseen.end());
+    mark_interior(rows);
   }
 }
 
@@ -171,12 +196,29 @@ void Engine::mark_interior(const std::vector<GatherRow>& rows) {
     if (scene_.materials[faces_.faces[mesh_->slot(slot).face].material].opening >= 0 ||
         rows[patch_of_slot_[slot]].escaped == 0)
       mark(patch_of_slot_[slot]);
+  for (const int slot : unseen_slots_) mark(patch_of_slot_[slot]);
   if (!scene_.point_sources.empty())
     for (std::size_t p = 0; p < rows.size(); ++p) mark(static_cast<int>(p));
+  // What a patch indoors sees is indoors if it sees a patch indoors itself. One ray that slips through an edge, between
+  // slivers, meets the outside of a wall, which does not look back.
+  const auto patch_at = [&](const Share& share) { return patch_of_slot_[share.index / mesh_->elements_per_slot()]; };
+  std::vector<int> pending;
   while (!stack.empty()) {
     const int patch = stack.back();
     stack.pop_back();
-    for (const Share& share : rows[patch].reached) mark(patch_of_slot_[share.index / mesh_->elements_per_slot()]);
+    for (const Share& share : rows[patch].reached)
+      if (patch_at(share) >= 0 && !is_interior_[patch_at(share)]) pending.push_back(patch_at(share));
+    if (!stack.empty()) continue;
+    std::sort(pending.begin(), pending.end());
+    pending.erase(std::unique(pending.begin(), pending.end()), pending.end());
+    std::erase_if(pending, [&](int other) {
+      const std::vector<Share>& seen = rows[other].reached;
+      if (std::none_of(seen.begin(), seen.end(),
+                       [&](const Share& share) { return patch_at(share) >= 0 && is_interior_[patch_at(share)]; }))
+        return false;
+      mark(other);
+      return true;
+    });
   }
   facts_.interior_patch_count = static_cast<int>(std::count(is_interior_.begin(), is_interior_.end(), 1));
 }

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from transom.daylight.condition import Condition, resolve_condition
 from transom.errors import InputError
@@ -35,7 +35,8 @@ class SuiteEntry(BaseModel):
 
     width: pictures are this wide and keep their view's proportions; omitted: the view's own size.
     reference: who knows the truth. layout: how a report shows it, view by view or as a grid of hours.
-    report: whether the report runs it. known: cases with a known answer that are drawn in code (transom.known.suite).
+    report: whether the report runs it. known: cases with a known answer that are drawn in code (transom.known.suite),
+    or groups of hard cases (transom.hard_cases).
     programs: renderers that a suite of known answers judges.
     """
 
@@ -45,12 +46,18 @@ class SuiteEntry(BaseModel):
     description: str = ""
     target_percent: float = Field(default=1.0, gt=0.0)
     width: int | None = Field(default=None, gt=0)
-    reference: Literal["mitsuba", "closed_form", "crosscheck"] = "mitsuba"
+    reference: Literal["mitsuba", "closed_form", "crosscheck", "hard"] = "mitsuba"
     layout: Literal["views", "hours"] = "views"
     report: bool = True
     known: list[str] = []
     programs: list[str] = ["engine"]
-    cases: list[CaseEntry] = Field(min_length=1)
+    cases: list[CaseEntry] = []
+
+    @model_validator(mode="after")
+    def _holds_something(self) -> SuiteEntry:
+        if not self.cases and not self.known:
+            raise ValueError("a suite needs cases, or known ones")
+        return self
 
 
 class SuiteFile(BaseModel):

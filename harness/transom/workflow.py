@@ -25,6 +25,7 @@ from transom.crosscheck import compare_references, render_references
 from transom.errors import InputError, StorageError
 from transom.failures import error_words, read_failure
 from transom.files import write_atomic
+from transom.hard_cases import compare_hard_cases
 from transom.judge import Missing, Outcome, Verdict, exit_code, judge, read_tolerances
 from transom.known.suite import compare_known, program_table
 from transom.progress import CaseProgress
@@ -37,6 +38,8 @@ from transom.suite import Suite, SuiteCase, load_suite
 from transom.visible import region_masks
 
 VISIBILITIES = ("volumes", "rays")
+DRAWN_IN_CODE = ("closed_form", "hard")
+"""Suites whose cases are rendered while they are compared."""
 ENGINE = "engine"
 
 LOG_WIDTH = 160
@@ -82,7 +85,7 @@ def chosen(suite: Suite, scenes: Collection[str]) -> Suite:
 def render_suite(suite: Suite, *, fresh: bool = False) -> list[Crash]:
     """Renders with the engine what is not there yet. A case that fails does not stop the others; a disk that takes no
     more files does (StorageError)."""
-    if suite.reference == "closed_form":
+    if suite.reference in DRAWN_IN_CODE:
         return []
     if suite.reference == "crosscheck":
         return [Crash(question, message) for question, message in render_references(suite, fresh=fresh)]

@@ -124,7 +124,9 @@ class Engine {
   const std::vector<int>& patch_slots() const { return slot_of_patch_; }
 
  private:
-  void find_patches(const std::vector<int>& first_slots, std::vector<GatherRow>& rows);
+  std::vector<int> first_wave() const;
+  void find_patches(std::vector<int> wave, std::vector<GatherRow>& rows);
+  void find_unseen_patches(std::vector<GatherRow>& rows);
   std::vector<int> first_slots() const;
   void mark_interior(const std::vector<GatherRow>& rows);
   void check_closed(const std::vector<GatherRow>& rows);
@@ -156,6 +158,7 @@ class Engine {
   std::vector<float> patch_area_;  // exposed part [m²]
   std::vector<glm::vec3> patch_reflectance_, patch_emitted_;
   std::vector<char> is_interior_;
+  std::vector<int> unseen_slots_;  // that see patches indoors and were seen by none
   bool connects_emitters_ = false;  // small emitters: found by connection, not by rays
   SparseRows form_factors_, through_, patch_sky_;
 
