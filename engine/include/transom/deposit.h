@@ -21,8 +21,8 @@ class DirectLight {
  public:
   DirectLight(const LightMesh& mesh, const RayScene& rays, const std::vector<PointSource>& sources);
 
-  /// Mean direct illuminance of the elements of `slots` that receive any. Stratified over each element; a patch that is
-  /// partly lit is sampled again sixteen times as densely.
+  /// Mean direct illuminance of the elements of `slots` that receive any. Stratified over each element; elements on an
+  /// edge of a beam are sampled again sixteen times as densely.
   std::vector<LitElement> deposit(const std::vector<Beam>& beams, const std::vector<int>& slots,
                                   std::uint32_t seed) const;
 
@@ -40,7 +40,9 @@ class DirectLight {
   struct LocalSource {
     glm::vec3 position, intensity;
   };
-  void deposit_on_slot(const std::vector<Beam>& beams, int slot, int samples, std::uint32_t seed, bool& is_mixed,
+  std::vector<glm::vec3> points_on(int slot, std::span<const int> elements, int samples, std::uint32_t seed) const;
+  void beam_on_slot(glm::vec3 direction, int slot, std::uint32_t seed, std::vector<float>& mean) const;
+  void deposit_on_slot(const std::vector<Beam>& beams, int slot, std::uint32_t seed,
                        std::vector<LitElement>& lit) const;
 
   const LightMesh& mesh_;
