@@ -436,31 +436,35 @@ std::vector<Irradiance> Engine::illuminance(const std::vector<glm::dvec3>& point
   return result;
 }
 
-Irradiance Engine::interpolate(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const {
-  if (options_.method == Method::kClassic) {
-    Irradiance constant;
-    const int patch = patch_of_slot_[mesh_->slot_index(face, side, mesh_->grid(face).locate(st).cell)];
-    if (patch < 0) return constant;
-    constant.sky = lighting_.patch_sky[patch];
-    constant.indirect = lighting_.patch_irradiance[patch] - lighting_.patch_sky[patch] - lighting_.patch_sun[patch];
-    return constant;
+NodeShares Engine::shown_at(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const {
+  if (nodes_) {
+    const NodeShares shares = nodes_->interpolate(face, side, st, lifted_point);
+    if (shares.count > 0) return shares;
   }
-  const NodeShares shares = nodes_->interpolate(face, side, st, lifted_point);
-  Irradiance result;
-  if (shares.count == 0) {  // no node can speak for the point: its patch does
-    const int patch = patch_of_slot_[mesh_->slot_index(face, side, mesh_->grid(face).locate(st).cell)];
-    if (patch < 0) return result;
-    result.sky = lighting_.patch_sky[patch];
-    result.indirect = lighting_.patch_irradiance[patch] - lighting_.patch_sky[patch] - lighting_.patch_sun[patch];
-    return result;
+  NodeShares alone;  // no node can speak for the point: its patch does
+  const int patch = patch_of_slot_[mesh_->slot_index(face, side, mesh_->grid(face).locate(st).cell)];
+  if (patch < 0) return alone;
+  alone.count = 1;
+  alone.node[0] = static_cast<int>(nodes_ ? nodes_->nodes().size() : 0) + patch;
+  alone.weight[0] = 1;
+  return alone;
+}
+
+void Engine::shown_radiance(std::vector<glm::vec4>& sky, std::vector<glm::vec4>& indirect) const {
+  const std::size_t node_count = nodes_ ? nodes_->nodes().size() : 0, patch_count = slot_of_patch_.size();
+  sky.resize(node_count + patch_count);
+  indirect.resize(node_count + patch_count);
+  parallel_indices(node_count, 1024, [&](std::size_t i) {
+    const glm::vec3 scale = reflectance(nodes_->surface(i) / 2, nodes_->surface(i) % 2) / kPi;
+    sky[i] = glm::vec4(scale * lighting_.node_sky[i], 0);
+    indirect[i] = glm::vec4(scale * lighting_.node_indirect[i], 0);
+  });
+  for (std::size_t p = 0; p < patch_count; ++p) {
+    const glm::vec3 scale = patch_reflectance_[p] / kPi, from_sky = lighting_.patch_sky[p];
+    sky[node_count + p] = glm::vec4(scale * from_sky, 0);
+    indirect[node_count + p] =
+        glm::vec4(scale * (lighting_.patch_irradiance[p] - from_sky - lighting_.patch_sun[p]), 0);
   }
-  for (int k = 0; k < shares.count; ++k) {
-    result.sky += shares.weight[k] * lighting_.node_sky[shares.node[k]];
-    result.indirect += shares.weight[k] * lighting_.node_indirect[shares.node[k]];
-  }
-  result.sky = glm::max(result.sky, glm::vec3(0));
-  result.indirect = glm::max(result.indirect, glm::vec3(0));
-  return result;
 }
 
 }  // namespace transom

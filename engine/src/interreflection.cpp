@@ -71,7 +71,7 @@ void Interreflection::find_clusters(const std::vector<PatchPlace>& places) {
   }
 }
 
-// With F_c and rho_c averaged over clusters by area: F_c (1 - rho_c F_c)^-1.
+// With F_c and rho_c averaged over clusters by area, and over colours: F_c (1 - rho_c F_c)^-1.
 void Interreflection::find_operators() {
   using Matrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const Eigen::Index m = cluster_count_;
@@ -85,20 +85,16 @@ void Interreflection::find_operators() {
       exchange(cluster_of_[i], cluster_of_[exchange_.entries[k].index]) += areas_[i] * exchange_.entries[k].weight;
   }
   for (Eigen::Index c = 0; c < m; ++c) exchange.row(c) /= std::max(cluster_area_[c], 1e-30f);
-  parallel_indices(3, 1, [&](std::size_t channel) {
-    Matrix system = Matrix::Identity(m, m);
-    for (Eigen::Index c = 0; c < m; ++c)
-      system.row(c) -=
-          reflectance[c][static_cast<int>(channel)] / std::max(cluster_area_[c], 1e-30f) * exchange.row(c);
-    const Matrix solved = exchange * system.partialPivLu().inverse();
-    operators_[channel].assign(solved.data(), solved.data() + solved.size());
-    // A room that loses nothing has no such operator: then the patches go on alone.
-    for (const float value : operators_[channel])
-      if (!std::isfinite(value)) {
-        operators_[channel].assign(operators_[channel].size(), 0.f);
-        break;
-      }
-  });
+  Matrix system = Matrix::Identity(m, m);
+  for (Eigen::Index c = 0; c < m; ++c) {
+    const glm::vec3 rho = reflectance[c] / std::max(cluster_area_[c], 1e-30f);
+    system.row(c) -= (rho.x + rho.y + rho.z) / 3 * exchange.row(c);
+  }
+  const Matrix solved = exchange * system.partialPivLu().inverse();
+  operator_.assign(solved.data(), solved.data() + solved.size());
+  // A room that loses nothing has no such operator: then the patches go on alone.
+  if (!std::all_of(operator_.begin(), operator_.end(), [](float value) { return std::isfinite(value); }))
+    operator_.assign(operator_.size(), 0.f);
 }
 
 int Interreflection::solve(const std::vector<glm::vec3>& emitted, const std::vector<glm::vec3>& direct,
@@ -107,16 +103,16 @@ int Interreflection::solve(const std::vector<glm::vec3>& emitted, const std::vec
   std::vector<glm::vec4> radiosity(n), next(n);
   for (std::size_t i = 0; i < n; ++i) radiosity[i] = glm::vec4(emitted[i] + reflectance_[i] * direct[i], 0);
   irradiance = direct;
-  std::vector<glm::vec3> left(m), carried(m);
+  std::vector<glm::vec4> left(m), carried(m);
   for (int cycle = 1; cycle <= maximum_cycles; ++cycle) {
     parallel_indices(n, kGrain, [&](std::size_t i) {
       irradiance[i] = direct[i] + glm::vec3(exchange_.dot(i, radiosity));
       next[i] = glm::vec4(emitted[i] + reflectance_[i] * irradiance[i], 0);
     });
     double change = 0, total = 0;
-    std::fill(left.begin(), left.end(), glm::vec3(0));
+    std::fill(left.begin(), left.end(), glm::vec4(0));
     for (std::size_t i = 0; i < n; ++i) {
-      const glm::vec3 difference(next[i] - radiosity[i]);
+      const glm::vec4 difference = next[i] - radiosity[i];
       left[cluster_of_[i]] += areas_[i] * difference;
       change += areas_[i] * (std::abs(difference.x) + std::abs(difference.y) + std::abs(difference.z));
       total += areas_[i] * (next[i].x + next[i].y + next[i].z);
@@ -124,15 +120,12 @@ int Interreflection::solve(const std::vector<glm::vec3>& emitted, const std::vec
     if (!(change > tolerance * total)) return cycle;
     for (std::size_t c = 0; c < m; ++c) left[c] /= std::max(cluster_area_[c], 1e-30f);
     parallel_indices(m, 32, [&](std::size_t c) {
-      for (int channel = 0; channel < 3; ++channel) {
-        const float* row = &operators_[channel][c * m];
-        float sum = 0;
-        for (std::size_t k = 0; k < m; ++k) sum += row[k] * left[k][channel];
-        carried[c][channel] = sum;
-      }
+      glm::vec4 sum(0);
+      for (std::size_t k = 0; k < m; ++k) sum += operator_[c * m + k] * left[k];
+      carried[c] = sum;
     });
     for (std::size_t i = 0; i < n; ++i)
-      radiosity[i] = next[i] + glm::vec4(reflectance_[i] * carried[cluster_of_[i]], 0);
+      radiosity[i] = next[i] + glm::vec4(reflectance_[i], 0) * carried[cluster_of_[i]];
   }
   throw std::runtime_error("interreflection has not converged: is the room closed and almost perfectly white?");
 }

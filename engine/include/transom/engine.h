@@ -35,7 +35,7 @@ struct SolveOptions {
   GatherSamples patch_samples{512, 128};
   GatherSamples node_samples{1024, 256};
   float node_spacing = 6;   ///< of nodes, against the harmonic mean distance of what a cell sees
-  double tolerance = 1e-6;  ///< flux in flight at which interreflection stops, relative
+  double tolerance = 1e-4;  ///< flux in flight at which interreflection stops, relative
   std::uint32_t seed = 1;
   bool trace = false;
 };
@@ -119,8 +119,12 @@ class Engine {
   const DirectLight& direct_light() const { return *direct_light_; }
   glm::vec3 reflectance(int face, Side side) const;
 
-  /// Sky and indirect irradiance at a point of a face, between its nodes. Zero where the side takes no part.
-  Irradiance interpolate(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const;
+  /// What speaks for the light at a point of a face: nodes around it, or else its patch. Numbers are those of
+  /// `shown_radiance`. Empty where the side takes no part.
+  NodeShares shown_at(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const;
+
+  /// Radiance reflected by every node, then by every patch, of the present light of sky and of surfaces [cd/m²].
+  void shown_radiance(std::vector<glm::vec4>& sky, std::vector<glm::vec4>& indirect) const;
 
   const SparseRows& form_factors() const { return form_factors_; }
   const std::vector<float>& patch_areas() const { return patch_area_; }

@@ -41,7 +41,7 @@ class Interreflection {
   int cluster_count_ = 0;
   std::vector<int> cluster_of_;
   std::vector<float> cluster_area_;
-  std::vector<float> operators_[3];  // by channel, row by row: irradiance of clusters from what they leave unreflected
+  std::vector<float> operator_;  // row by row: irradiance of clusters from what they have not yet reflected
 };
 
 }  // namespace transom
