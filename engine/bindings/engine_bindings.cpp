@@ -232,24 +232,25 @@ NB_MODULE(_engine, m) {
           nb::call_guard<nb::gil_scoped_release>(), "Shoots at most so often; whether more is to come.")
       .def(
           "render",
-          [](Session& s, const View& view, Visibility visibility, int edge_samples) {
+          [](Session& s, const View& view, Visibility visibility, int edge_samples, bool components) {
             Frame frame;
             {
               const nb::gil_scoped_release release;
-              frame = s.renderer.render(view, {visibility, edge_samples});
+              frame = s.renderer.render(view, {visibility, edge_samples, components});
             }
             nb::dict result;
             const int w = frame.width, h = frame.height;
             result["radiance"] = picture(std::move(frame.radiance), w, h);
+            result["edge_pixel_count"] = frame.edge_pixel_count;
+            if (!components) return result;
             result["sun"] = picture(std::move(frame.sun), w, h);
             result["sky"] = picture(std::move(frame.sky), w, h);
             result["indirect"] = picture(std::move(frame.indirect), w, h);
             result["emitted"] = picture(std::move(frame.emitted), w, h);
             result["exterior"] = picture(std::move(frame.exterior), w, h);
-            result["edge_pixel_count"] = frame.edge_pixel_count;
             return result;
           },
-          "view"_a, "visibility"_a, "edge_samples"_a)
+          "view"_a, "visibility"_a, "edge_samples"_a, "components"_a)
       .def(
           "illuminance",
           [](const Session& s, In<double, nb::shape<-1, 3>> points, In<float, nb::shape<-1, 3>> normals,

@@ -57,6 +57,8 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
     const float element_edge = facts_.maximum_edge_m / static_cast<float>(options_.elements_per_edge);
     direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources, scene_.materials,
                                                   element_edge * element_edge);
+    beam_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, std::vector<PointSource>{}, scene_.materials,
+                                                element_edge * element_edge);
   }
   std::vector<GatherRow> rows;
   std::vector<int> divisions;
@@ -74,12 +76,18 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
     assemble_transfer(rows);
     rows.clear();
   }
-  {
-    const TracePhase phase(trace_, "nodes");
-    if (options_.method == Method::kClassic)
-      solve_classic();
-    else
+  if (options_.method == Method::kClassic) {
+    const TracePhase phase(trace_, "forward rays");
+    solve_classic();
+  } else {
+    {
+      const TracePhase phase(trace_, "nodes");
       gather_nodes(divisions);
+    }
+    const TracePhase phase(trace_, "links");
+    light_always();
+    links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes());
+    links_->prepare(beam_slots());
   }
   facts_.face_count = static_cast<int>(faces_.faces.size());
   facts_.patch_count = static_cast<int>(slot_of_patch_.size());
@@ -275,6 +283,15 @@ void Engine::assemble_transfer(std::vector<GatherRow>& rows) {
   }
   connects_emitters_ = emitting < kConnectedShare * interior;
   facts_.defects = make_reciprocal(form_factors_, patch_area_, row_sums);
+  std::vector<PatchPlace> places(n);
+  for (std::size_t p = 0; p < n; ++p) {
+    const Slot slot = mesh_->slot(slot_of_patch_[p]);
+    const Face& face = faces_.faces[slot.face];
+    places[p] = {face.position(mesh_->cell_parameters(slot.face, slot.cell, glm::vec2(1.f / 3))),
+                 slot.side == 0 ? face.normal : -face.normal};
+  }
+  interreflection_ =
+      std::make_unique<Interreflection>(form_factors_, through_, patch_reflectance_, patch_area_, places);
 }
 
 // Cells are divided where the harmonic mean distance of what they see is short against their size: there irradiance
@@ -331,16 +348,45 @@ glm::vec3 Engine::sky_light(const SparseRows& rows, std::size_t row) const {
   return sum + sky * lighting_.condition.sky_colour;
 }
 
-// What nodes are connected to: elements lit by beams, and small emitters.
-std::vector<BrightElement> Engine::bright_elements(const std::vector<LitElement>& lit) const {
+// Patches that a beam may light: they see some of the sky.
+std::vector<int> Engine::beam_slots() const {
+  const int ground = sky_index_->count() - 1;
+  std::vector<int> slots;
+  for (std::size_t p = 0; p < slot_of_patch_.size(); ++p) {
+    if (patch_reflectance_[p] == glm::vec3(0)) continue;
+    bool sees_sky = false;
+    for (std::size_t k = patch_sky_.begin[p]; k < patch_sky_.begin[p + 1] && !sees_sky; ++k)
+      sees_sky = patch_sky_.entries[k].index != ground;
+    if (sees_sky) slots.push_back(slot_of_patch_[p]);
+  }
+  return slots;
+}
+
+void Engine::light_always() {
   const int per_slot = mesh_->elements_per_slot();
+  lit_by_sources_ = direct_light_->deposit({}, slot_of_patch_, hash_seed(options_.seed, kBeamStream));
+  bright_always_ = bright_elements(lit_by_sources_);
+  if (connects_emitters_)
+    for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)
+      if (patch_emitted_[p] != glm::vec3(0))
+        for (int e = 0; e < per_slot; ++e)
+          bright_always_.push_back({slot_of_patch_[p] * per_slot + e, patch_emitted_[p]});
+  const std::vector<Node>& nodes = nodes_->nodes();
+  node_always_.assign(nodes.size(), glm::vec3(0));
+  if (bright_always_.empty()) return;
+  const FirstBounce first_bounce(*mesh_, *rays_, bright_always_);
+  parallel_indices(nodes.size(), kGrain, [&](std::size_t i) {
+    if (nodes_->is_exposed(i)) node_always_[i] = first_bounce.irradiance(nodes[i].position, nodes[i].normal);
+  });
+}
+
+// What points are connected to for the light that falls on elements.
+std::vector<BrightElement> Engine::bright_elements(const std::vector<LitElement>& lit) const {
   std::vector<BrightElement> bright;
-  for (const LitElement& e : lit)
-    bright.push_back({e.element, patch_reflectance_[patch_of_slot_[e.element / per_slot]] * e.illuminance});
-  if (!connects_emitters_) return bright;
-  for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)
-    if (patch_emitted_[p] != glm::vec3(0))
-      for (int e = 0; e < per_slot; ++e) bright.push_back({slot_of_patch_[p] * per_slot + e, patch_emitted_[p]});
+  for (const LitElement& e : lit) {
+    const glm::vec3 rho = patch_reflectance_[patch_of_slot_[e.element / mesh_->elements_per_slot()]];
+    if (rho != glm::vec3(0)) bright.push_back({e.element, rho * e.illuminance});
+  }
   return bright;
 }
 
@@ -355,62 +401,67 @@ void Engine::relight(Condition condition) {
   lighting_.condition = std::move(condition);
   const std::size_t n = slot_of_patch_.size();
   const int per_slot = mesh_->elements_per_slot();
-  std::vector<LitElement> lit;
+  std::vector<LitElement>& lit = lighting_.lit_elements;
   {
     const TracePhase phase(trace_, "beams");
-    lit = direct_light_->deposit(lighting_.condition.beams, slot_of_patch_, hash_seed(options_.seed, kBeamStream));
-    first_bounce_ = std::make_unique<FirstBounce>(*mesh_, *rays_, bright_elements(lit));
+    lit = beam_light_->deposit(lighting_.condition.beams, slot_of_patch_, hash_seed(options_.seed, kBeamStream));
+    lighting_.bright_elements = bright_elements(lit);
   }
-  std::vector<glm::vec3> sky(n), from_beams(n, glm::vec3(0)), direct(n);
+  std::vector<glm::vec3>&sky = lighting_.patch_sky, &sun = lighting_.patch_sun;
+  sky.resize(n);
+  sun.assign(n, glm::vec3(0));
   {
     const TracePhase phase(trace_, "sky");
     parallel_indices(n, 64, [&](std::size_t p) { sky[p] = sky_light(patch_sky_, p); });
   }
+  const std::size_t node_count = node_sky_.row_count();
+  lighting_.node_indirect = node_always_;
+  {
+    const TracePhase phase(trace_, "first reflection");
+    links_->add_irradiance(lighting_.bright_elements, lighting_.node_indirect);
+  }
+  lit.insert(lit.end(), lit_by_sources_.begin(), lit_by_sources_.end());
+  lighting_.bright_elements.insert(lighting_.bright_elements.end(), bright_always_.begin(), bright_always_.end());
   {
     const TracePhase phase(trace_, "interreflection");
-    lighting_.element_direct.assign(n * static_cast<std::size_t>(per_slot), glm::vec3(0));
     for (const LitElement& e : lit) {
       const int patch = patch_of_slot_[e.element / per_slot];
       const Slot slot = mesh_->slot(e.element / per_slot);
-      from_beams[patch] +=
+      sun[patch] +=
           e.illuminance * (mesh_->element_area(slot.face, slot.cell, e.element % per_slot) / patch_area_[patch]);
-      lighting_.element_direct[patch * per_slot + e.element % per_slot] = e.illuminance;
     }
-    for (std::size_t p = 0; p < n; ++p) direct[p] = sky[p] + from_beams[p];
-    lighting_.patch_irradiance = direct;
+    std::vector<glm::vec3> direct(n);
+    for (std::size_t p = 0; p < n; ++p) direct[p] = sky[p] + sun[p];
     lighting_.sweeps =
-        solve_interreflection(form_factors_, through_, patch_reflectance_, patch_emitted_, direct, patch_area_,
-                              options_.tolerance, kMaximumSweeps, lighting_.patch_irradiance);
+        interreflection_->solve(patch_emitted_, direct, options_.tolerance, kMaximumSweeps, lighting_.patch_irradiance);
     lighting_.patch_smooth_radiosity.resize(n);
     for (std::size_t p = 0; p < n; ++p)
       lighting_.patch_smooth_radiosity[p] = (connects_emitters_ ? glm::vec3(0) : patch_emitted_[p]) +
-                                            patch_reflectance_[p] * (lighting_.patch_irradiance[p] - from_beams[p]);
+                                            patch_reflectance_[p] * (lighting_.patch_irradiance[p] - sun[p]);
   }
   {
     const TracePhase phase(trace_, "gather");
-    const std::size_t node_count = node_sky_.row_count();
     lighting_.node_sky.resize(node_count);
-    lighting_.node_indirect.resize(node_count);
     parallel_indices(node_count, 64, [&](std::size_t i) {
       lighting_.node_sky[i] = sky_light(node_sky_, i);
-      lighting_.node_indirect[i] = node_patches_.dot(i, lighting_.patch_smooth_radiosity);
-      if (nodes_->is_exposed(i))
-        lighting_.node_indirect[i] += first_bounce_->irradiance(nodes_->nodes()[i].position, nodes_->nodes()[i].normal);
+      lighting_.node_indirect[i] += node_patches_.dot(i, lighting_.patch_smooth_radiosity);
     });
   }
 }
 
-glm::vec3 Engine::element_radiosity(int element) const {
+// By patch * elements_per_slot + element [lx].
+std::vector<glm::vec3> Engine::element_direct() const {
   const int per_slot = mesh_->elements_per_slot();
-  const int patch = patch_of_slot_[element / per_slot];
-  if (patch < 0) return glm::vec3(0);
-  return lighting_.patch_smooth_radiosity[patch] + (connects_emitters_ ? patch_emitted_[patch] : glm::vec3(0)) +
-         patch_reflectance_[patch] * lighting_.element_direct[patch * per_slot + element % per_slot];
+  std::vector<glm::vec3> direct(slot_of_patch_.size() * static_cast<std::size_t>(per_slot), glm::vec3(0));
+  for (const LitElement& e : lighting_.lit_elements)
+    direct[patch_of_slot_[e.element / per_slot] * per_slot + e.element % per_slot] += e.illuminance;
+  return direct;
 }
 
 std::vector<Irradiance> Engine::illuminance(const std::vector<glm::dvec3>& points,
                                             const std::vector<glm::vec3>& normals, GatherSamples samples) const {
   std::vector<Irradiance> result(points.size());
+  const FirstBounce first_bounce(*mesh_, *rays_, lighting_.bright_elements);
   parallel_indices(points.size(), 1, [&](std::size_t i) {
     const glm::vec3 normal = glm::normalize(normals[i]);
     const Node node{glm::vec3(points[i] - faces_.origin) + faces_.ray_offset() * normal, normal};
@@ -420,7 +471,7 @@ std::vector<Irradiance> Engine::illuminance(const std::vector<glm::dvec3>& point
     sky.append(row.sky);
     result[i].direct = direct_light_->illuminance(lighting_.condition.beams, node.position, normal);
     result[i].sky = sky_light(sky, 0);
-    result[i].indirect = first_bounce_->irradiance(node.position, normal);
+    result[i].indirect = first_bounce.irradiance(node.position, normal);
     for (const std::vector<Share>* shares : {&row.reached, &row.through})
       for (const Share& share : to_patches(*shares))
         result[i].indirect += share.weight * lighting_.patch_smooth_radiosity[share.index];
@@ -428,33 +479,35 @@ std::vector<Irradiance> Engine::illuminance(const std::vector<glm::dvec3>& point
   return result;
 }
 
-Irradiance Engine::interpolate(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const {
-  if (options_.method == Method::kClassic) {
-    Irradiance constant;
-    const int patch = patch_of_slot_[mesh_->slot_index(face, side, mesh_->grid(face).locate(st).cell)];
-    if (patch < 0) return constant;
-    constant.sky = lighting_.patch_sky[patch];
-    constant.indirect = lighting_.patch_irradiance[patch] - lighting_.patch_sky[patch] - lighting_.patch_sun[patch];
-    return constant;
+NodeShares Engine::shown_at(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const {
+  if (nodes_) {
+    const NodeShares shares = nodes_->interpolate(face, side, st, lifted_point);
+    if (shares.count > 0) return shares;
   }
-  const NodeShares shares = nodes_->interpolate(face, side, st, lifted_point);
-  Irradiance result;
-  if (shares.count == 0) {  // no node can speak for the point: its patch does
-    const int patch = patch_of_slot_[mesh_->slot_index(face, side, mesh_->grid(face).locate(st).cell)];
-    if (patch < 0) return result;
-    const glm::vec3 normal = side == 0 ? faces_.faces[face].normal : -faces_.faces[face].normal;
-    result.sky = sky_light(patch_sky_, static_cast<std::size_t>(patch));
-    result.indirect = form_factors_.dot(static_cast<std::size_t>(patch), lighting_.patch_smooth_radiosity) +
-                      first_bounce_->irradiance(lifted_point, normal);
-    return result;
+  NodeShares alone;  // no node can speak for the point: its patch does
+  const int patch = patch_of_slot_[mesh_->slot_index(face, side, mesh_->grid(face).locate(st).cell)];
+  if (patch < 0) return alone;
+  alone.count = 1;
+  alone.node[0] = static_cast<int>(nodes_ ? nodes_->nodes().size() : 0) + patch;
+  alone.weight[0] = 1;
+  return alone;
+}
+
+void Engine::shown_radiance(std::vector<glm::vec4>& sky, std::vector<glm::vec4>& indirect) const {
+  const std::size_t node_count = nodes_ ? nodes_->nodes().size() : 0, patch_count = slot_of_patch_.size();
+  sky.resize(node_count + patch_count);
+  indirect.resize(node_count + patch_count);
+  parallel_indices(node_count, 1024, [&](std::size_t i) {
+    const glm::vec3 scale = reflectance(nodes_->surface(i) / 2, nodes_->surface(i) % 2) / kPi;
+    sky[i] = glm::vec4(scale * lighting_.node_sky[i], 0);
+    indirect[i] = glm::vec4(scale * lighting_.node_indirect[i], 0);
+  });
+  for (std::size_t p = 0; p < patch_count; ++p) {
+    const glm::vec3 scale = patch_reflectance_[p] / kPi, from_sky = lighting_.patch_sky[p];
+    sky[node_count + p] = glm::vec4(scale * from_sky, 0);
+    indirect[node_count + p] =
+        glm::vec4(scale * (lighting_.patch_irradiance[p] - from_sky - lighting_.patch_sun[p]), 0);
   }
-  for (int k = 0; k < shares.count; ++k) {
-    result.sky += shares.weight[k] * lighting_.node_sky[shares.node[k]];
-    result.indirect += shares.weight[k] * lighting_.node_indirect[shares.node[k]];
-  }
-  result.sky = glm::max(result.sky, glm::vec3(0));
-  result.indirect = glm::max(result.indirect, glm::vec3(0));
-  return result;
 }
 
 }  // namespace transom

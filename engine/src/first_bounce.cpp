@@ -19,50 +19,61 @@ struct Connection {
 
 }  // namespace
 
+ElementShape element_shape(const LightMesh& mesh, int element_index) {
+  const Slot slot = mesh.slot(element_index / mesh.elements_per_slot());
+  const int element = element_index % mesh.elements_per_slot();
+  const bool is_quad = mesh.grid(slot.face).is_quad;
+  ElementShape shape;
+  shape.corner_count = is_quad ? 4 : 3;
+  const glm::vec2 quad_corner[4]{{0, 0}, {1, 0}, {1, 1}, {0, 1}}, triangle_corner[3]{{0, 0}, {1, 0}, {0, 1}};
+  for (int k = 0; k < shape.corner_count; ++k) {
+    const glm::vec2 local = is_quad ? quad_corner[k] : triangle_corner[k];
+    // In a triangle's grid every second cell is turned; its corners keep their sense, since it is turned by half a
+    // circle.
+    const int place = slot.side == 0 ? k : shape.corner_count - 1 - k;
+    shape.corner[place] =
+        mesh.faces().faces[slot.face].position(mesh.element_parameters(slot.face, slot.cell, element, local));
+  }
+  shape.middle = mesh.lifted_position(
+      slot.face, slot.side,
+      mesh.element_parameters(slot.face, slot.cell, element, is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3)));
+  shape.area = mesh.element_area(slot.face, slot.cell, element);
+  return shape;
+}
+
+float element_share(glm::vec3 point, glm::vec3 normal, const ElementShape& shape, glm::vec3 element_normal) {
+  const glm::vec3 to_element = shape.middle - point;
+  const float distance2 = glm::dot(to_element, to_element);
+  if (distance2 <= kAdjacent * kAdjacent * 2 * shape.area)
+    return point_to_polygon(point, normal, {shape.corner, static_cast<std::size_t>(shape.corner_count)});
+  const float cosine = glm::dot(to_element, normal), height = -glm::dot(to_element, element_normal);
+  if (cosine <= 0 || height <= 0) return 0;
+  return shape.area * cosine * height / (kPi * distance2 * distance2);
+}
+
 FirstBounce::FirstBounce(const LightMesh& mesh, const RayScene& rays, const std::vector<BrightElement>& bright)
     : mesh_(mesh), rays_(rays) {
   for (const BrightElement& element : bright) add(element);
 }
 
 void FirstBounce::add(const BrightElement& bright) {
-  const int slot_index = bright.element / mesh_.elements_per_slot(),
-            element = bright.element % mesh_.elements_per_slot();
+  const int slot_index = bright.element / mesh_.elements_per_slot();
+  const float strength = bright.radiosity.x + bright.radiosity.y + bright.radiosity.z;
+  if (!(strength > 0)) return;
   const Slot slot = mesh_.slot(slot_index);
   const Face& face = mesh_.faces().faces[slot.face];
-  const glm::vec3 normal = slot.side == 0 ? face.normal : -face.normal;
   if (patches_.empty() || patches_.back().slot != slot_index)
-    patches_.push_back({slot_index, pieces_.size(), pieces_.size(), glm::vec3(0), normal, glm::vec3(0), 0,
+    patches_.push_back({slot_index, pieces_.size(), pieces_.size(), glm::vec3(0),
+                        slot.side == 0 ? face.normal : -face.normal, glm::vec3(0), 0,
                         std::sqrt(2 * mesh_.cell_area(slot.face, slot.cell))});
   LitPatch& patch = patches_.back();
-
-  LitPiece piece;
-  const bool is_quad = mesh_.grid(slot.face).is_quad;
-  piece.corner_count = is_quad ? 4 : 3;
-  const glm::vec2 quad_corner[4]{{0, 0}, {1, 0}, {1, 1}, {0, 1}}, triangle_corner[3]{{0, 0}, {1, 0}, {0, 1}};
-  for (int k = 0; k < piece.corner_count; ++k) {
-    const glm::vec2 local = is_quad ? quad_corner[k] : triangle_corner[k];
-    // Counter-clockwise from the lit side.
-    const int place = slot.side == 0 ? k : piece.corner_count - 1 - k;
-    piece.corner[place] = face.position(mesh_.element_parameters(slot.face, slot.cell, element, local));
-  }
-  // In a triangle's grid every second cell is turned; its corners keep their sense, since it is turned by half a
-  // circle.
-  piece.middle = mesh_.lifted_position(
-      slot.face, slot.side,
-      mesh_.element_parameters(slot.face, slot.cell, element, is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3)));
-  piece.area = mesh_.element_area(slot.face, slot.cell, element);
-  piece.radiosity = bright.radiosity;
-  pieces_.push_back(piece);
-
-  const float weight = piece.area * (bright.radiosity.x + bright.radiosity.y + bright.radiosity.z);
-  if (!(weight > 0)) {
-    pieces_.pop_back();
-    return;
-  }
+  pieces_.push_back({element_shape(mesh_, bright.element), bright.radiosity});
+  const ElementShape& shape = pieces_.back().shape;
+  const float weight = shape.area * strength;
   patch.last_element = pieces_.size();
-  patch.centroid = (patch.centroid * patch.weight + piece.middle * weight) / (patch.weight + weight);
+  patch.centroid = (patch.centroid * patch.weight + shape.middle * weight) / (patch.weight + weight);
   patch.weight += weight;
-  patch.flux += piece.area * piece.radiosity;
+  patch.flux += shape.area * bright.radiosity;
 }
 
 glm::vec3 FirstBounce::irradiance(glm::vec3 point, glm::vec3 normal) const {
@@ -86,17 +97,8 @@ glm::vec3 FirstBounce::irradiance(glm::vec3 point, glm::vec3 normal) const {
     }
     for (std::size_t k = patch.first_element; k < patch.last_element; ++k) {
       const LitPiece& piece = pieces_[k];
-      const glm::vec3 to_piece = piece.middle - point;
-      const float d2 = glm::dot(to_piece, to_piece);
-      if (d2 > kAdjacent * kAdjacent * 2 * piece.area) {
-        const float cosine = glm::dot(to_piece, normal), piece_height = -glm::dot(to_piece, patch.normal);
-        if (cosine > 0 && piece_height > 0)
-          connect(piece.middle, piece.radiosity * (piece.area * cosine * piece_height / (kPi * d2 * d2)));
-      } else {
-        const float share =
-            point_to_polygon(point, normal, {piece.corner, static_cast<std::size_t>(piece.corner_count)});
-        if (share > 0) connect(piece.middle, piece.radiosity * share);
-      }
+      const float share = element_share(point, normal, piece.shape, patch.normal);
+      if (share > 0) connect(piece.shape.middle, piece.radiosity * share);
     }
   }
   if (connections.empty()) return glm::vec3(0);

@@ -30,7 +30,7 @@ class DirectLight {
               const std::vector<Material>& materials, float small_opening_m2);
 
   /// Mean direct illuminance of the elements of `slots` that receive any, in the order of `slots`. Stratified over each
-  /// element; a patch that is partly lit is sampled again sixteen times as densely.
+  /// element; elements on an edge of a beam are sampled again sixteen times as densely.
   std::vector<LitElement> deposit(const std::vector<Beam>& beams, const std::vector<int>& slots,
                                   std::uint32_t seed) const;
 
@@ -48,7 +48,9 @@ class DirectLight {
   struct LocalSource {
     glm::vec3 position, intensity;
   };
-  void deposit_on_slot(const std::vector<Beam>& beams, int slot, int samples, std::uint32_t seed, bool& is_mixed,
+  std::vector<glm::vec3> points_on(int slot, std::span<const int> elements, int samples, std::uint32_t seed) const;
+  void beam_on_slot(glm::vec3 direction, int slot, std::uint32_t seed, std::vector<float>& mean) const;
+  void deposit_on_slot(const std::vector<Beam>& beams, int slot, std::uint32_t seed,
                        std::vector<LitElement>& lit) const;
 
   void ignore_small_openings(glm::vec3 direction, std::span<const glm::vec3> points, std::span<float> share) const;

@@ -16,6 +16,19 @@ struct BrightElement {
   glm::vec3 radiosity;
 };
 
+/// An element as points see it.
+struct ElementShape {
+  glm::vec3 corner[4];  ///< counter-clockwise from the lit side
+  int corner_count;
+  glm::vec3 middle;  ///< lifted
+  float area;        ///< [m²]
+};
+ElementShape element_shape(const LightMesh& mesh, int element);
+
+/// Form factor from a point to an unoccluded element that faces `element_normal`: a closed form if it is adjacent,
+/// else as if all of it were at its middle.
+float element_share(glm::vec3 point, glm::vec3 normal, const ElementShape& shape, glm::vec3 element_normal);
+
 /// The bright elements of a condition, by patch, ready to be looked at from points.
 class FirstBounce {
  public:
@@ -37,11 +50,8 @@ class FirstBounce {
     float size;      // diameter [m]
   };
   struct LitPiece {
-    glm::vec3 corner[4];
-    int corner_count;
-    glm::vec3 middle;     // lifted
+    ElementShape shape;
     glm::vec3 radiosity;  // [lm/m²]
-    float area;
   };
   void add(const BrightElement& bright);
 
