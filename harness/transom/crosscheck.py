@@ -33,7 +33,7 @@ from transom.run import Question, Target, free_first, render_case
 from transom.scene.model import View
 from transom.sensor_file import SensorTable, scene_sensors
 from transom.suite import Suite, SuiteCase
-from transom.visible import EXTERIOR, region_masks
+from transom.visible import EXTERIOR, INTERIOR, region_masks
 
 Bool = NDArray[np.bool_]
 Float64 = NDArray[np.float64]
@@ -42,8 +42,17 @@ Options = Mapping[str, Any]
 SENSOR_COUNT = 4
 """Sensors of a scene that are checked, spread evenly over all of them: paths without a cache are slow."""
 
+BLOCK_SIDES = (4, 8, 16)
+"""Pixels across blocks that are compared: as small as the noise of both pictures lets them be."""
+
+MEAN_NOISE_PERCENT = 0.35
+"""Of regions and blocks that are judged: k u then takes half of the tolerance. Noisier regions are told in a note."""
+
 SENSOR_NOISE_PERCENT = 0.1
 """Standard error asked of Mitsuba at these sensors: less than that of Radiance's paths, which cost more."""
+
+FULL_SENSOR_NOISE_PERCENT = 0.2
+"""The same with full physics: where model error is worth telling, it is larger than this."""
 
 FULL_IMAGE_NOISE_PERCENT = 6.0
 """The same of pixels with full physics, which are only compared as means."""
@@ -85,19 +94,20 @@ def crosscheck_questions(suite: Suite) -> Iterator[tuple[Renderer, Question]]:
     for entry, view in views:
         yield radiance, _view_question(entry, radiance, EXACT, view)
     for entry in sensors:
-        yield mitsuba, _sensor_question(entry, mitsuba, FULL, SENSOR_NOISE_PERCENT)
-    for entry, view in views:
-        yield radiance, _view_question(entry, radiance, {"preset": "fast"}, view)
-        if entry.scene.name == LADDER_SCENE:
-            for options in ladder_options():
-                yield radiance, _view_question(entry, radiance, options, view)
-    for entry in sensors:
+        yield mitsuba, _sensor_question(entry, mitsuba, FULL, FULL_SENSOR_NOISE_PERCENT)
         if entry.scene.name == LADDER_SCENE:
             yield radiance, _sensor_question(entry, radiance, EXACT_FULL)
     for entry, view in views:
+        if entry.scene.name == LADDER_SCENE:
+            for options in ladder_options():
+                yield radiance, _view_question(entry, radiance, options, view)
+        else:
+            yield radiance, _view_question(entry, radiance, {"preset": "fast"}, view)
+    for entry, view in views:
         yield mitsuba, _view_question(entry, mitsuba, FULL, view, FULL_IMAGE_NOISE_PERCENT)
     for entry, view in views:
-        yield radiance, _view_question(entry, radiance, {"preset": "accurate"}, view)
+        if entry.scene.name != LADDER_SCENE:
+            yield radiance, _view_question(entry, radiance, {"preset": "accurate"}, view)
 
 
 def ladder_options() -> list[Options]:
@@ -219,7 +229,7 @@ def check_sensors(
 def check_picture(
     entry: SuiteCase, view: View, first: ImageResult, second: ImageResult, masks: Mapping[str, Bool], batches: int
 ) -> list[CrossCheck]:
-    """Region means and 4x4 blocks of two pictures of one size, each with independent halves, Radiance's first."""
+    """Region means and blocks of two pictures of one size, each with independent halves, Radiance's first."""
     ours, theirs = luminance(first.mean), luminance(second.mean)
     common: dict[str, Any] = {
         "scene": entry.scene.name,
@@ -231,30 +241,37 @@ def check_picture(
         "second": "mitsuba",
         "batch_count": batches,
     }
-    rows = []
+    rows, unclear = [], []
     for region, mask in masks.items():
         if region == EXTERIOR:
             continue
         value, truth = float(ours[mask].mean()), float(theirs[mask].mean())
+        difference = 100 * (value / truth - 1) if truth else 0.0
         error = math.hypot(mean_error(first, mask, region), mean_error(second, mask, region))
+        noise = 100 * error / truth if truth else 0.0
+        if region != INTERIOR and noise > MEAN_NOISE_PERCENT:
+            unclear.append(f"{region} {difference:+.2f} ± {noise:.2f}")
+            continue
         rows.append(
             CrossCheck(
                 region=region,
                 quantity="image mean",
                 first_value=value,
                 second_value=truth,
-                difference_percent=100 * (value / truth - 1) if truth else 0.0,
-                uncertainty_percent=100 * error / truth if truth else 0.0,
+                difference_percent=difference,
+                uncertainty_percent=noise,
                 **common,
             )
         )
-    value, error = block_difference(first, second, masks["interior"])
+    if unclear:
+        rows[0] = replace(rows[0], note=f"regions too noisy to be judged [%]: {', '.join(unclear)}")
+    side, value, error = clear_blocks(first, second, masks[INTERIOR])
     rows.append(
         CrossCheck(
-            region="interior",
+            region=f"{INTERIOR}, {side}x{side} pixels",
             quantity="image blocks",
-            first_value=float(ours[masks["interior"]].mean()),
-            second_value=float(theirs[masks["interior"]].mean()),
+            first_value=float(ours[masks[INTERIOR]].mean()),
+            second_value=float(theirs[masks[INTERIOR]].mean()),
             difference_percent=100 * value,
             uncertainty_percent=100 * error,
             note="root of the mean product of the differences of independent halves, which noise does not inflate",
@@ -264,13 +281,22 @@ def check_picture(
     return rows
 
 
+def clear_blocks(first: ImageResult, second: ImageResult, mask: Bool) -> tuple[int, float, float]:
+    """The smallest side of blocks at which noise lets their difference be told, that difference, its uncertainty."""
+    for side in BLOCK_SIDES:
+        value, error = block_difference(first, second, mask, side)
+        if 100 * error <= MEAN_NOISE_PERCENT:
+            break
+    return side, value, error
+
+
 def ladder_steps(entry: SuiteCase, view: View, missing: list[Missing]) -> list[LadderStep]:
     """The steps that have been rendered, each against the one before and against Mitsuba."""
     truth = reference_picture(entry, view)
     if truth is None:
         return []
     reference = luminance(halved(truth.image()).mean)
-    mask = region_masks(entry.scene, view)["interior"]
+    mask = region_masks(entry.scene, view)[INTERIOR]
     floor = floor_cd_m2(reference[mask])
     steps: list[LadderStep] = []
     before: Float64 | None = None

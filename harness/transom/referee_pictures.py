@@ -39,8 +39,10 @@ def picture_of(entry: SuiteCase, view: View, renderer: str, options: Mapping[str
     return find_bundle(make_case(entry.scene, entry.condition, load_renderer(renderer), options, view=view))
 
 
-def block_difference(first: ImageResult, second: ImageResult, mask: Bool) -> tuple[float, float]:
-    """Root mean square relative difference of the 4x4 blocks that lie in `mask`, and its uncertainty, as shares.
+def block_difference(
+    first: ImageResult, second: ImageResult, mask: Bool, side: int = BLOCK_PIXELS
+) -> tuple[float, float]:
+    """Root mean square relative difference of the square blocks that lie in `mask`, and its uncertainty, as shares.
 
     From the halves of both, d1 d2 with d_i = R_i / T_i - 1: the noises of halves are independent, so that the mean
     product has no share of them. The uncertainty is a third of the way to the root three standard errors further up,
@@ -48,9 +50,9 @@ def block_difference(first: ImageResult, second: ImageResult, mask: Bool) -> tup
     """
     if first.halves is None or second.halves is None:
         raise ValueError("pictures without halves: their noise cannot be told from their difference")
-    inside = _block_means(mask.astype(np.float64)) > 0.999
+    inside = _block_means(mask.astype(np.float64), side) > 0.999
     differences = [
-        _block_means(luminance(ours))[inside] / _block_means(luminance(theirs))[inside] - 1
+        _block_means(luminance(ours), side)[inside] / _block_means(luminance(theirs), side)[inside] - 1
         for ours, theirs in zip(first.halves, second.halves, strict=True)
     ]
     product = differences[0] * differences[1]
@@ -91,8 +93,7 @@ def mean_error(image: ImageResult, mask: Bool, region: str) -> float:
     return max(independent, abs(difference) / 2)
 
 
-def _block_means(image: Float64) -> Float64:
-    side = BLOCK_PIXELS
+def _block_means(image: Float64, side: int) -> Float64:
     height, width = (length // side for length in image.shape)
     means: Float64 = image[: height * side, : width * side].reshape(height, side, width, side).mean(axis=(1, 3))
     return means

@@ -145,7 +145,7 @@ class CheapEngine:
     version = "cheap-1"
 
     def default_options(self) -> dict[str, Any]:
-        return {"visibility": "rays", "seed": 1}
+        return {"visibility": "rays", "seed": 1, "sensor_rays": 16, "sensor_opening_rays": 16}
 
     def render(
         self,

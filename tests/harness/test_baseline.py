@@ -142,6 +142,7 @@ def test_changed_input_and_measures_that_come_or_go_fail_by_name(tmp_path: Path)
         ({"indirect": 1.02, "energy": 0.008}, "the transfer is too strong"),
         ({"indirect": 0.9, "energy": -0.02, "sweeps": 3.0}, "the bounces stop early"),
         ({"indirect_interior": 1.06, "indirect_floor": 0.97}, "reflectance acts at the wrong place"),
+        ({"indirect": 1.4, "energy": 0.014}, "The balance all but holds: reflectance acts at the wrong place"),
         ({"x": 1.51}, "Shadow of the sun on floor facing up moved by 10.0 mm (x +10.0"),
         ({"sky": 1.01, "indirect": 1.01}, "Indirect light changed with it"),
     ],

@@ -130,6 +130,8 @@ def test_the_slower_phase_comes_first_in_the_table_and_sets_the_exit_code(tmp_pa
         (["--against", "--output"], ["--output"]),
         (["--against", "HEAD", "--of", "nothing"], ["--of", "nothing"]),
         (["--against", "HEAD", "--rounds", "10"], ["--rounds", "10", "odd"]),
+        (["--against", "HEAD", "--only", "paint"], ["--only", "paint", "relight"]),
+        (["--against", "HEAD", "-o", "a.txt"], ["a.txt", ".json"]),
     ],
 )
 def test_wrong_revisions_are_one_clear_line(
