@@ -37,7 +37,7 @@ class SuiteEntry(BaseModel):
     reference: who knows the truth. layout: how a report shows it, view by view or as a grid of hours.
     report: whether the report runs it. known: cases with a known answer that are drawn in code (transom.known.suite),
     or groups of hard cases (transom.hard_cases).
-    programs: renderers that a suite of known answers judges.
+    programs: renderers that a suite of known answers judges. method: how the engine finds light.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
@@ -51,6 +51,7 @@ class SuiteEntry(BaseModel):
     report: bool = True
     known: list[str] = []
     programs: list[str] = ["engine"]
+    method: Literal["gather", "classic"] = "gather"
     cases: list[CaseEntry] = []
 
     @model_validator(mode="after")
@@ -71,12 +72,14 @@ class SuiteFile(BaseModel):
 
 @dataclass(frozen=True)
 class SuiteCase:
-    """One scene in one condition: the views to render, at their final size, and whether to measure the sensors."""
+    """One scene in one condition: the views to render, at their final size, whether to measure the sensors, and the
+    engine's method."""
 
     scene: Scene
     condition: Condition
     views: tuple[View, ...]
     sensors: bool
+    method: str = "gather"
 
 
 @dataclass(frozen=True)
@@ -117,7 +120,7 @@ def load_suite(name: str, path: Path | None = None) -> Suite:
     if name not in suites:
         raise InputError("is not a suite", field="SUITE", value=name, remedy=f"Choose one of {', '.join(suites)}")
     entry = suites[name]
-    cases = [case for line in entry.cases for case in _cases(line, entry.width)]
+    cases = [case for line in entry.cases for case in _cases(line, entry.width, entry.method)]
     return Suite(
         name,
         entry.title,
@@ -163,11 +166,11 @@ def invalid_field(error: ValidationError, path: Path) -> InputError:
     return InputError(f"is refused: {first['msg']}", file=path, field=place or "file", value=value)
 
 
-def _cases(line: CaseEntry, width: int | None) -> list[SuiteCase]:
+def _cases(line: CaseEntry, width: int | None, method: str) -> list[SuiteCase]:
     scene = load_scene(line.scene)
     views = choose(scene.views, line.views, scene, "view")
     if width is not None:
         views = tuple(resized(view, width) for view in views)
     specs = choose(scene.conditions, line.conditions, scene, "condition")
     measured = line.sensors and bool(scene.sensors)
-    return [SuiteCase(scene, resolve_condition(spec, scene.site), views, measured) for spec in specs]
+    return [SuiteCase(scene, resolve_condition(spec, scene.site), views, measured, method) for spec in specs]

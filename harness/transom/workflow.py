@@ -30,7 +30,17 @@ from transom.judge import Missing, Outcome, Verdict, exit_code, judge, read_tole
 from transom.known.suite import compare_known, program_table
 from transom.progress import CaseProgress
 from transom.renderer import ImageResult, Renderer, load_renderer
-from transom.run import COARSE_VISIBILITY, Question, coarse_options, engine_questions, free_first, render_case
+from transom.run import (
+    COARSE_VISIBILITY,
+    DEFAULT_METHOD,
+    Question,
+    chosen_visibilities,
+    coarse_options,
+    engine_questions,
+    free_first,
+    method_options,
+    render_case,
+)
 from transom.scene import scene_root
 from transom.scene.model import View
 from transom.sensor_file import SensorTable, scene_sensors
@@ -145,6 +155,8 @@ def compare_suite(suite: Suite, build: Path, crashes: Collection[Crash], engine:
         comparison = compare_known(suite)
     elif suite.reference == "crosscheck":
         comparison = compare_references(suite, {crash.question.case.key: crash.message for crash in crashes})
+    elif suite.reference == "hard":
+        comparison = compare_hard_cases(suite)
     else:
         failed = {crash.question.case.key: crash.message for crash in crashes}
         comparison = _compare_with_mitsuba(suite, failed, engine or load_renderer(ENGINE))
@@ -221,12 +233,13 @@ def _compare_view(
     if truth is None:
         found.missing.append(_no_reference(entry, view.name))
     rendered: dict[str, Bundle] = {}
-    for visibility in VISIBILITIES:
-        case = make_case(scene, condition, engine, {"visibility": visibility}, view=view)
+    for visibility in chosen_visibilities(entry, VISIBILITIES):
+        case = make_case(scene, condition, engine, method_options(entry, visibility), view=view)
         ours = find_bundle(case)
         if ours is None or case.key in crashed:
             message = crashed.get(case.key, "not rendered: transom run")
-            found.missing.append(Missing(Outcome.CRASHED, scene.name, view.name, condition.name, visibility, message))
+            method = method_words(entry, visibility)
+            found.missing.append(Missing(Outcome.CRASHED, scene.name, view.name, condition.name, method, message))
             continue
         rendered[visibility] = ours
     pictures = {visibility: bundle.image() for visibility, bundle in rendered.items()}
@@ -235,7 +248,7 @@ def _compare_view(
         reference = truth.image()
         coarse = _coarse(entry, engine, view=view)
         for visibility, bundle in rendered.items():
-            names = _names(entry, view.name, visibility, bundle, truth)
+            names = _names(entry, view.name, method_words(entry, visibility), bundle, truth)
             rough = None
             if coarse is not None and COARSE_VISIBILITY in pictures:
                 rough = change_of_method(coarse.image(), pictures[COARSE_VISIBILITY], pictures[visibility])
@@ -250,7 +263,7 @@ def _compare_sensors(
 ) -> None:
     scene, condition = entry.scene, entry.condition
     table = scene_sensors(scene)
-    case = make_case(scene, condition, engine, {}, sensors=table)
+    case = make_case(scene, condition, engine, method_options(entry), sensors=table)
     ours, truth = find_bundle(case), find_bundle(make_case(scene, condition, mitsuba, {}, sensors=table))
     if truth is None:
         found.missing.append(_no_reference(entry, "sensors"))
@@ -258,10 +271,15 @@ def _compare_sensors(
         message = crashed.get(case.key, "not measured: transom run")
         found.missing.append(Missing(Outcome.CRASHED, scene.name, "sensors", condition.name, ENGINE, message))
     elif truth is not None:
-        names = _names(entry, "", "rays", ours, truth)
+        names = _names(entry, "", method_words(entry, "rays"), ours, truth)
         coarse = _coarse(entry, engine, sensors=table)
         rough = None if coarse is None else coarse.sensors()
         found.sensors += compare_sensors(ours.sensors(), truth.sensors(), names, rough)
+
+
+def method_words(entry: SuiteCase, visibility: str) -> str:
+    """How rows name what made a picture: the visibility method, or the engine's method where it is not the default."""
+    return visibility if entry.method == DEFAULT_METHOD else entry.method
 
 
 def change_of_method(coarse: ImageResult, usual: ImageResult, ours: ImageResult) -> ImageResult:
@@ -275,7 +293,7 @@ def _coarse(
 ) -> Bundle | None:
     """The engine's answer from half as many patches, where it was rendered."""
     options = coarse_options(engine)
-    if options is None:
+    if options is None or entry.method != DEFAULT_METHOD:
         return None
     return find_bundle(make_case(entry.scene, entry.condition, engine, options, view=view, sensors=sensors))
 
