@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from transom.bundle import Bundle, find_bundle, make_case, repository_store
+from transom.bundle import Bundle, cache_store, make_case, repository_store
 from transom.claims import CaseBusyError
 from transom.colour import luminance
+from transom.compare import SensorComparison
 from transom.comparison import COMPARISON_FORMAT, Comparison, CrossCheck, LadderStep, ModelError
 from transom.errors import StorageError
 from transom.failures import error_words
@@ -31,16 +32,23 @@ from transom.referee_pictures import block_difference, halved, mean_error, pictu
 from transom.renderer import ImageResult, Renderer, load_renderer
 from transom.run import Question, Target, free_first, render_case
 from transom.scene.model import View
-from transom.sensor_file import SensorTable, scene_sensors
+from transom.sensor_file import SensorTable
 from transom.suite import Suite, SuiteCase
+from transom.validation import (
+    FULL,
+    absent,
+    sensor_model_errors,
+    sensors_of,
+    spread_sensors,
+    validate_sensors,
+    value_of,
+    view_model_errors,
+)
 from transom.visible import EXTERIOR, INTERIOR, region_masks
 
 Bool = NDArray[np.bool_]
 Float64 = NDArray[np.float64]
 Options = Mapping[str, Any]
-
-SENSOR_COUNT = 4
-"""Sensors of a scene that are checked, spread evenly over all of them: paths without a cache are slow."""
 
 BLOCK_SIDES = (4, 8, 16)
 """Pixels across blocks that are compared: as small as the noise of both pictures lets them be."""
@@ -58,8 +66,7 @@ FULL_IMAGE_NOISE_PERCENT = 6.0
 """The same of pixels with full physics, which are only compared as means."""
 
 EXACT: Options = {"preset": "exact"}
-FULL: Options = {"physics": "full"}
-EXACT_FULL: Options = {"preset": "exact", "physics": "full"}
+EXACT_FULL: Mapping[str, Any] = {"preset": "exact", "physics": "full"}
 
 CLOSER_SCENE = "test_room"
 """Where the ladder is shown, pictures have full physics too, and both programs are compared with full physics."""
@@ -85,7 +92,7 @@ class Wanted:
 
 def crosscheck_questions(suite: Suite) -> Iterator[tuple[Renderer, Question]]:
     """Everything that the suite needs, what decides first."""
-    mitsuba, radiance = load_renderer("mitsuba"), load_renderer("radiance")
+    engine, mitsuba, radiance = (load_renderer(name) for name in ("engine", "mitsuba", "radiance"))
     sensors = [entry for entry in suite.cases if entry.sensors]
     for entry in sensors:
         yield mitsuba, _sensor_question(entry, mitsuba, {}, SENSOR_NOISE_PERCENT)
@@ -97,6 +104,7 @@ def crosscheck_questions(suite: Suite) -> Iterator[tuple[Renderer, Question]]:
         yield mitsuba, _sensor_question(entry, mitsuba, FULL, FULL_SENSOR_NOISE_PERCENT)
         if entry.scene.name == CLOSER_SCENE:
             yield radiance, _sensor_question(entry, radiance, EXACT_FULL)
+        yield engine, _sensor_question(entry, engine, {})
     for entry, view in views:
         if entry.scene.name == CLOSER_SCENE:
             for options in ladder_options():
@@ -120,7 +128,7 @@ def ladder_options() -> list[Options]:
 
 
 def render_references(suite: Suite, *, fresh: bool = False) -> list[tuple[Question, str]]:
-    """Renders what is missing into the repository's store; the cases that failed, and why."""
+    """Renders what is missing, references into the repository's store; the cases that failed, and why."""
     asked = list(crosscheck_questions(suite))
     renderers = {id(question): renderer for renderer, question in asked}
     questions = [replace(question, command=f"transom run {suite.name}") for _, question in asked]
@@ -132,9 +140,9 @@ def render_references(suite: Suite, *, fresh: bool = False) -> list[tuple[Questi
             options = question.case.options
             words = (options.get("preset"), options.get("parameters"), options.get("physics"))
             bars.begin(" ".join([question.case.label, *(str(word) for word in words if word)]))
-            store = repository_store()
+            renderer = by_key[question.case.key]
+            store = cache_store() if renderer.name == "engine" else repository_store()
             try:
-                renderer = by_key[question.case.key]
                 bundle = render_case(renderer, question, store, bars.update, fresh=fresh, wait=wait)
             except (CaseBusyError, StorageError):
                 raise
@@ -152,16 +160,18 @@ def compare_references(suite: Suite, crashed: Mapping[str, str] | None = None) -
     """All that the referees say of each other, from what has been rendered. crashed: messages by key of a case."""
     checks: list[CrossCheck] = []
     models: list[ModelError] = []
+    validated: list[SensorComparison] = []
     ladder: list[LadderStep] = []
     missing: list[Missing] = []
     for entry in suite.cases:
         if entry.sensors:
             checks += _sensor_checks(entry, missing)
-            models += _sensor_models(entry, missing)
+            models += sensor_model_errors(entry, missing)
+            validated += validate_sensors(entry, missing)
         for view in entry.views:
             checks += _view_checks(entry, view, missing)
             if entry.scene.name == CLOSER_SCENE:
-                models += _view_models(entry, view, missing)
+                models += view_model_errors(entry, view, missing)
                 ladder += ladder_steps(entry, view, missing)
     by_key = {question.case.key: question for _, question in crosscheck_questions(suite)} if crashed else {}
     for key, message in (crashed or {}).items():
@@ -172,21 +182,12 @@ def compare_references(suite: Suite, crashed: Mapping[str, str] | None = None) -
         COMPARISON_FORMAT,
         suite.name,
         suite.title,
+        sensors=tuple(validated),
         crosschecks=tuple(checks),
         model_errors=tuple(models),
         ladder=tuple(ladder),
         missing=tuple(missing),
     )
-
-
-def spread_sensors(entry: SuiteCase) -> SensorTable:
-    """SENSOR_COUNT of the scene's sensors, evenly spread over them, the first and the last included."""
-    table = scene_sensors(entry.scene)
-    if table is None:
-        raise ValueError(f"{entry.scene.name} has no sensors")
-    count = min(SENSOR_COUNT, len(table.points))
-    rows = np.unique(np.linspace(0, len(table.points) - 1, count).round().astype(int))
-    return SensorTable(tuple(table.sets[row] for row in rows), table.points[rows], table.normals[rows])
 
 
 def check_sensors(
@@ -196,7 +197,7 @@ def check_sensors(
 
     One row and not one each: without a cache a sensor costs minutes to 0.3 %, and their noises are independent.
     """
-    values = [(*_value(first, index), *_value(second, index)) for index in range(len(second.sets))]
+    values = [(*value_of(first, index), *value_of(second, index)) for index in range(len(second.sets))]
     lit = [(name, *value) for name, value in zip(second.sets, values, strict=True) if value[2] > 0]
     if not lit:
         return []
@@ -304,7 +305,7 @@ def ladder_steps(entry: SuiteCase, view: View, missing: list[Missing]) -> list[L
     for number, options in enumerate(ladder_options(), start=1):
         bundle = picture_of(entry, view, "radiance", options)
         if bundle is None:
-            missing.append(_absent(entry, view.name, f"ladder {number}"))
+            missing.append(absent(entry, view.name, f"ladder {number}"))
             continue
         picture = luminance(bundle.image().mean)
         change = None if before is None else 100 * float(_relative(picture, before, mask, floor).mean())
@@ -343,93 +344,28 @@ def _view_question(
     return Question(case, None if percent is None else Target(percent))
 
 
-def _sensors_of(entry: SuiteCase, renderer: str, options: Options) -> Bundle | None:
-    case = make_case(entry.scene, entry.condition, load_renderer(renderer), options, sensors=spread_sensors(entry))
-    return find_bundle(case)
-
-
 def _sensor_checks(entry: SuiteCase, missing: list[Missing]) -> list[CrossCheck]:
     rows: list[CrossCheck] = []
     pairs: list[tuple[str, Options, Options]] = [("matched", EXACT, {})]
     if entry.scene.name == CLOSER_SCENE:
         pairs.append(("full", EXACT_FULL, FULL))
     for physics, radiance_options, mitsuba_options in pairs:
-        first = _sensors_of(entry, "radiance", radiance_options)
-        second = _sensors_of(entry, "mitsuba", mitsuba_options)
+        first = sensors_of(entry, "radiance", radiance_options)
+        second = sensors_of(entry, "mitsuba", mitsuba_options)
         if first is None or second is None:
-            missing.append(_absent(entry, "sensors", f"{'radiance' if first is None else 'mitsuba'} {physics}"))
+            missing.append(absent(entry, "sensors", f"{'radiance' if first is None else 'mitsuba'} {physics}"))
         else:
             rows += check_sensors(entry, physics, first.sensors(), second.sensors(), _batches(first, second))
-    return rows
-
-
-def _sensor_models(entry: SuiteCase, missing: list[Missing]) -> list[ModelError]:
-    matched, full = _sensors_of(entry, "mitsuba", {}), _sensors_of(entry, "mitsuba", FULL)
-    if matched is None or full is None:
-        missing.append(_absent(entry, "sensors", "mitsuba full"))
-        return []
-    simple, whole = matched.sensors(), full.sensors()
-    rows = []
-    for index, name in enumerate(simple.sets):
-        value, error = _value(simple, index)
-        truth, truth_error = _value(whole, index)
-        rows.append(_model_error(entry, "", f"{name} {index}", "sensor", "lx", (value, truth), (error, truth_error)))
     return rows
 
 
 def _view_checks(entry: SuiteCase, view: View, missing: list[Missing]) -> list[CrossCheck]:
     first, second = picture_of(entry, view, "radiance", EXACT), reference_picture(entry, view)
     if first is None or second is None:
-        missing.append(_absent(entry, view.name, "radiance exact" if first is None else "mitsuba"))
+        missing.append(absent(entry, view.name, "radiance exact" if first is None else "mitsuba"))
         return []
     masks = region_masks(entry.scene, view)
     return check_picture(entry, view, first.image(), halved(second.image()), masks, _batches(first, second))
-
-
-def _view_models(entry: SuiteCase, view: View, missing: list[Missing]) -> list[ModelError]:
-    matched, full = reference_picture(entry, view), picture_of(entry, view, "mitsuba", FULL)
-    if matched is None or full is None:
-        missing.append(_absent(entry, view.name, "mitsuba full"))
-        return []
-    simple, whole = halved(matched.image()), full.image()
-    rows = []
-    for region, mask in region_masks(entry.scene, view).items():
-        if region == EXTERIOR:
-            continue
-        values = (float(luminance(simple.mean)[mask].mean()), float(luminance(whole.mean)[mask].mean()))
-        errors = (mean_error(simple, mask, region), mean_error(whole, mask, region))
-        rows.append(_model_error(entry, view.name, region, "image mean", "cd/m²", values, errors))
-    return rows
-
-
-def _model_error(
-    entry: SuiteCase,
-    view: str,
-    region: str,
-    quantity: str,
-    unit: str,
-    values: tuple[float, float],
-    errors: tuple[float, float],
-) -> ModelError:
-    matched, full = values
-    return ModelError(
-        scene=entry.scene.name,
-        view=view,
-        region=region,
-        condition=entry.condition.name,
-        quantity=quantity,
-        unit=unit,
-        matched=matched,
-        full=full,
-        model_error_percent=100 * (matched / full - 1) if full else 0.0,
-        uncertainty_percent=100 * math.hypot(*errors) / full if full else 0.0,
-    )
-
-
-def _value(table: SensorTable, index: int) -> tuple[float, float]:
-    if table.illuminance is None or table.standard_error is None:
-        raise ValueError("sensors without values cannot be compared")
-    return float(table.illuminance[index]), float(table.standard_error[index])
 
 
 def _batches(first: Bundle, second: Bundle) -> int:
@@ -438,8 +374,3 @@ def _batches(first: Bundle, second: Bundle) -> int:
         int(bundle.record.facts.get("batches", bundle.record.facts.get("passes", 0))) for bundle in (first, second)
     ]
     return min(counts)
-
-
-def _absent(entry: SuiteCase, view: str, what: str) -> Missing:
-    message = "not rendered: transom run crosscheck"
-    return Missing(Outcome.NO_REFERENCE, entry.scene.name, view, entry.condition.name, what, message)

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from reference_rooms import PlainCondition, window_room
 
+from transom import validation
 from transom.colour import luminance
 from transom.comparison import COMPARISON_FORMAT, Comparison
-from transom.crosscheck import check_picture, check_sensors
+from transom.crosscheck import check_picture, check_sensors, ladder_options
 from transom.daylight.cie_sky import CieSky
 from transom.daylight.sky_model import SkyModel
-from transom.judge import Outcome, judge, read_tolerances
+from transom.judge import Missing, Outcome, judge, read_tolerances
 from transom.referee_pictures import block_difference, halved
 from transom.renderer import ImageResult, Renderer
 from transom.scene import scene_root
@@ -22,7 +23,7 @@ from transom.scene.model import View
 from transom.sensor_file import SensorTable
 from transom.suite import SuiteCase
 from transom_reference.mitsuba_renderer import MitsubaRenderer
-from transom_reference.radiance_renderer import RadianceRenderer
+from transom_reference.radiance_renderer import PRESETS, RadianceRenderer
 
 SUN = (0.48, -0.6, 0.64)
 SENSORS = SensorTable(
@@ -107,3 +108,41 @@ def test_halving_keeps_means_and_halves_the_noise_of_independent_pixels() -> Non
     assert small.mean.mean() == pytest.approx(image.mean.mean(), rel=1e-6)
     assert small.standard_error is not None and image.standard_error is not None
     assert small.standard_error.mean() == pytest.approx(image.standard_error.mean() / 2, rel=1e-5)
+
+
+class Measured:
+    """A bundle of sensors that is not on disk."""
+
+    def __init__(self, values: list[float], errors: list[float]) -> None:
+        self.table = SENSORS.measured(np.array(values), np.array(errors))
+
+    def sensors(self) -> SensorTable:
+        return self.table
+
+
+def test_model_error_is_matched_against_full_with_both_noises(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = {
+        False: Measured([102.0, 99.0, 50.0], [0.3, 0.0, 0.0]),
+        True: Measured([100.0, 100.0, 50.0], [0.4, 0.1, 0.0]),
+    }
+    monkeypatch.setattr(validation, "sensors_of", lambda _entry, _name, options: answers[bool(options)])
+    rows = validation.sensor_model_errors(entry(), [])
+    assert [row.model_error_percent for row in rows] == pytest.approx([2.0, -1.0, 0.0])
+    assert [row.uncertainty_percent for row in rows] == pytest.approx([0.5, 0.1, 0.0])
+
+
+def test_missing_full_physics_is_missing_and_no_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(validation, "sensors_of", lambda *_: None)
+    missing: list[Missing] = []
+    assert validation.sensor_model_errors(entry(), missing) == []
+    assert [gap.outcome for gap in missing] == [Outcome.NO_REFERENCE]
+
+
+def test_ladder_rises_to_the_accurate_preset() -> None:
+    steps = ladder_options()
+    assert steps[-1] == {"preset": "accurate"}
+    assert {"preset": "fast"} in steps
+    for option in ("-ab", "-ad", "-ar"):
+        words = [(step.get("parameters") or PRESETS[step["preset"]].parameters).split() for step in steps]
+        values = [int(step[step.index(option) + 1]) for step in words]
+        assert values == sorted(values), option

@@ -87,7 +87,6 @@ def report(
     code = write_report(output, build, render=not rendered)
     typer.echo(f"{output / 'index.html'}")
     if publish:
-        for path in publish_report(output):
-            typer.echo(f"{path}")
+        typer.echo(f"reports/published: {len(publish_report(output))} files")
     if code:
         raise typer.Exit(code)
