@@ -231,7 +231,7 @@ NB_MODULE(_engine, m) {
           "view"_a, "visibility"_a, "edge_samples"_a, "components"_a)
       .def(
           "illuminance",
-          [](const Session& s, In<double, nb::shape<-1, 3>> points, In<float, nb::shape<-1, 3>> normals,
+          [](Session& s, In<double, nb::shape<-1, 3>> points, In<float, nb::shape<-1, 3>> normals,
              GatherSamples samples) {
             std::vector<Irradiance> e;
             {

@@ -70,20 +70,26 @@ std::vector<glm::vec3> DirectLight::points_on(int slot_index, std::span<const in
   const Slot slot = mesh_.slot(slot_index);
   std::vector<glm::vec3> points;
   points.reserve(elements.size() * static_cast<std::size_t>(samples));
+  const bool is_quad = mesh_.grid(slot.face).is_quad;
+  const int edge = static_cast<int>(std::lround(std::sqrt(static_cast<float>(mesh_.elements_per_slot()))));
+  // A cell, and a quad's element in it, is the affine or bilinear picture of its own square or triangle.
+  const auto corner = [&](float u, float v) {
+    return mesh_.lifted_position(slot.face, slot.side, mesh_.cell_parameters(slot.face, slot.cell, {u, v}));
+  };
+  const glm::vec3 a = corner(0, 0), ab = corner(1, 0) - a, ac = corner(0, 1) - a,
+                  twist = is_quad ? corner(1, 1) - a - ab - ac : glm::vec3(0);
   for (const int e : elements) {
     const SobolSequence sequence(
         hash_seed(seed, static_cast<std::uint64_t>(slot_index) * mesh_.elements_per_slot() + e));
-    // An element is the affine or bilinear picture of its own square or triangle.
-    const auto corner = [&](float u, float v) {
-      return mesh_.lifted_position(slot.face, slot.side,
-                                   mesh_.element_parameters(slot.face, slot.cell, e, {u, v}));
-    };
-    const bool is_quad = mesh_.grid(slot.face).is_quad;
-    const glm::vec3 a = corner(0, 0), ab = corner(1, 0) - a, ac = corner(0, 1) - a,
-                    twist = is_quad ? corner(1, 1) - a - ab - ac : glm::vec3(0);
     for (int i = 0; i < samples; ++i) {
-      const glm::vec2 u = mesh_.sample_local(slot.face, sequence.point2(static_cast<std::uint32_t>(i)));
-      points.push_back(a + u.x * ab + u.y * ac + u.x * u.y * twist);
+      const glm::vec2 local = mesh_.sample_local(slot.face, sequence.point2(static_cast<std::uint32_t>(i)));
+      if (is_quad) {
+        const glm::vec2 u = (glm::vec2(e % edge, e / edge) + local) / static_cast<float>(edge);
+        points.push_back(a + u.x * ab + u.y * ac + u.x * u.y * twist);
+      } else {
+        points.push_back(
+            mesh_.lifted_position(slot.face, slot.side, mesh_.element_parameters(slot.face, slot.cell, e, local)));
+      }
     }
   }
   return points;
@@ -161,8 +167,7 @@ std::vector<LitElement> DirectLight::deposit(const std::vector<Beam>& beams, con
   std::vector<LitElement> lit;
   if (beams.empty() && sources_.empty()) return lit;
   std::vector<std::vector<LitElement>> by_slot(slots.size());
-  parallel_indices(slots.size(), kGrain,
-                   [&](std::size_t i) { deposit_on_slot(beams, slots[i], seed, by_slot[i]); });
+  parallel_indices(slots.size(), kGrain, [&](std::size_t i) { deposit_on_slot(beams, slots[i], seed, by_slot[i]); });
   for (const std::vector<LitElement>& part : by_slot) lit.insert(lit.end(), part.begin(), part.end());
   return lit;
 }

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <mutex>
 #include <numbers>
+#include <numeric>
 
 namespace transom {
 namespace {
@@ -94,6 +97,27 @@ glm::vec2 SobolSequence::point2(std::uint32_t index) const {
 glm::vec4 SobolSequence::point4(std::uint32_t index) const {
   return {coordinate(index, 0, seeds_[0]), coordinate(index, 1, seeds_[1]), coordinate(index, 2, seeds_[2]),
           coordinate(index, 3, seeds_[3])};
+}
+
+const std::vector<std::uint32_t>& coherent_order(int count) {
+  static std::mutex mutex;
+  static std::map<int, std::vector<std::uint32_t>> orders;
+  const std::lock_guard lock(mutex);
+  std::vector<std::uint32_t>& order = orders[count];
+  if (!order.empty() || count <= 0) return order;
+  order.resize(static_cast<std::size_t>(count));
+  std::iota(order.begin(), order.end(), 0u);
+  int bits = 0;  // of each coordinate: cells of about sixteen points
+  while ((16 << (2 * (bits + 1))) <= count) ++bits;
+  const auto cell = [bits](std::uint32_t index) {
+    std::uint64_t interleaved = 0;
+    for (int bit = 1; bit <= bits; ++bit)
+      for (const int dimension : {0, 1})
+        interleaved = 2 * interleaved + ((plain_coordinate(index, dimension) >> (32 - bit)) & 1u);
+    return interleaved;
+  };
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return cell(a) < cell(b); });
+  return order;
 }
 
 glm::vec2 sample_disc(glm::vec2 u) {

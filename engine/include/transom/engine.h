@@ -99,9 +99,10 @@ class Engine {
   void begin_relight(Condition condition);
   bool continue_relight(int shots);
 
-  /// Irradiance at points (world coordinates [m]) with unit normals, under the present condition.
+  /// Irradiance at points (world coordinates [m]) with unit normals, under the present condition. What the last points
+  /// see is kept: asked again under another condition, they cost sums and connections to sunlit patches.
   std::vector<Irradiance> illuminance(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
-                                      GatherSamples samples) const;
+                                      GatherSamples samples);
 
   /// Flux balance under the present condition; `rays_per_opening` samples each opening triangle independently.
   EnergyAudit audit(int rays_per_opening) const;
@@ -178,6 +179,18 @@ class Engine {
   std::vector<LitElement> lit_by_sources_;
   std::vector<BrightElement> bright_always_;
   std::vector<glm::vec3> node_always_;
+
+  // Points at which illuminance was asked for last.
+  struct Sensors {
+    std::vector<glm::dvec3> points;
+    std::vector<glm::vec3> normals;
+    GatherSamples samples;
+    std::vector<Node> nodes;
+    SparseRows sky, patches;
+  };
+  void gather_sensors(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
+                      GatherSamples samples);
+  Sensors sensors_;
 
   // kClassic alone.
   std::unique_ptr<ForwardRays> forward_rays_;
