@@ -144,7 +144,9 @@ NB_MODULE(_engine, m) {
       .def_ro("node_count", &SolveFacts::node_count)
       .def_ro("maximum_edge_m", &SolveFacts::maximum_edge_m)
       .def_ro("leak_share", &SolveFacts::leak_share)
-      .def_ro("defects", &SolveFacts::defects);
+      .def_ro("defects", &SolveFacts::defects)
+      .def_ro("cluster_count", &SolveFacts::cluster_count)
+      .def_ro("link_bytes", &SolveFacts::link_bytes);
 
   nb::class_<Condition>(m, "Condition")
       .def(

@@ -68,6 +68,7 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
     light_always();
     links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes());
     links_->prepare(beam_slots());
+    facts_.link_bytes = links_->byte_count();
   }
   facts_.face_count = static_cast<int>(faces_.faces.size());
   facts_.patch_count = static_cast<int>(slot_of_patch_.size());
@@ -237,6 +238,7 @@ void Engine::assemble_transfer(std::vector<GatherRow>& rows) {
   }
   interreflection_ =
       std::make_unique<Interreflection>(form_factors_, through_, patch_reflectance_, patch_area_, places);
+  facts_.cluster_count = interreflection_->cluster_count();
 }
 
 // Cells are divided where the harmonic mean distance of what they see is short against their size: there irradiance

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "transom/parallel.h"
 
@@ -143,9 +142,8 @@ TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<floa
     // Newton's step for the logarithms of the scales: (diag(sum) + D S D) step = residual, by conjugate gradients.
     solve_positive_definite(
         [&](const std::vector<double>& x, std::vector<double>& y) {
-          parallel_indices(n, kGrain, [&](std::size_t i) {
-            y[i] = sum[i] > 0 ? sum[i] * x[i] + scaled_product(i, x) : x[i];
-          });
+          parallel_indices(n, kGrain,
+                           [&](std::size_t i) { y[i] = sum[i] > 0 ? sum[i] * x[i] + scaled_product(i, x) : x[i]; });
         },
         sum, residual, step);
     double largest = 0;
@@ -170,28 +168,6 @@ TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<floa
       defects.reciprocity = std::max(defects.reciprocity, std::abs(forth - back) / std::max(areas[i], areas[j]));
     }
   return defects;
-}
-
-int solve_interreflection(const SparseRows& form_factors, const SparseRows& through,
-                          const std::vector<glm::vec3>& reflectance, const std::vector<glm::vec3>& emitted,
-                          const std::vector<glm::vec3>& direct, const std::vector<float>& areas, double tolerance,
-                          int maximum_sweeps, std::vector<glm::vec3>& irradiance) {
-  const std::size_t n = form_factors.row_count();
-  std::vector<glm::vec3> radiosity(n);
-  for (std::size_t i = 0; i < n; ++i) radiosity[i] = emitted[i] + reflectance[i] * irradiance[i];
-  for (int sweep = 1; sweep <= maximum_sweeps; ++sweep) {
-    double change = 0, total = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-      const glm::vec3 e = direct[i] + form_factors.dot(i, radiosity) + through.dot(i, radiosity);
-      const glm::vec3 difference = glm::abs(e - irradiance[i]) * reflectance[i];
-      change += static_cast<double>(areas[i]) * (difference.x + difference.y + difference.z);
-      irradiance[i] = e;
-      radiosity[i] = emitted[i] + reflectance[i] * e;
-      total += static_cast<double>(areas[i]) * (radiosity[i].x + radiosity[i].y + radiosity[i].z);
-    }
-    if (!(change > tolerance * total)) return sweep;
-  }
-  throw std::runtime_error("interreflection has not converged: is the room closed and almost perfectly white?");
 }
 
 }  // namespace transom

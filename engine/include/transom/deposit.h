@@ -21,8 +21,8 @@ class DirectLight {
  public:
   DirectLight(const LightMesh& mesh, const RayScene& rays, const std::vector<PointSource>& sources);
 
-  /// Mean direct illuminance of the elements of `slots` that receive any. Stratified over each element; elements on an
-  /// edge of a beam are sampled again sixteen times as densely.
+  /// Mean direct illuminance of the elements of `slots` that receive any. Stratified over each element; a patch that is
+  /// partly lit is sampled again eight times as densely.
   std::vector<LitElement> deposit(const std::vector<Beam>& beams, const std::vector<int>& slots,
                                   std::uint32_t seed) const;
 

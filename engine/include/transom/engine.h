@@ -46,6 +46,8 @@ struct SolveFacts {
   float maximum_edge_m = 0;
   double leak_share = 0;  ///< of the hemisphere rays of interior patches, those that met nothing
   TransferDefects defects;
+  int cluster_count = 0;       ///< of patches, for interreflection
+  std::size_t link_bytes = 0;  ///< of what is kept of how nodes see patches
 };
 
 /// Flux balance of the interior [lm], linear RGB. Interior: every side that light from the rooms' side of the openings,
@@ -77,10 +79,10 @@ struct Lighting {
   std::vector<BrightElement> bright_elements;      ///< what points are connected to
   std::vector<glm::vec3> patch_sky;                ///< directly from sky and ground [lx]
   std::vector<glm::vec3> patch_sun;                ///< directly from beams and point sources [lx]
-  int sweeps = 0;
-  int shots = 0;              ///< kClassic: patches that have shot
-  double unshot_share = 0;    ///< kClassic: flux in flight, relative
-  int forward_ray_count = 0;  ///< kClassic
+  int sweeps = 0;                                  ///< cycles of interreflection
+  int shots = 0;                                   ///< kClassic: patches that have shot
+  double unshot_share = 0;                         ///< kClassic: flux in flight, relative
+  int forward_ray_count = 0;                       ///< kClassic
 };
 
 class Engine {

@@ -1,4 +1,4 @@
-/// @file Interreflection between patches: form factors made reciprocal and closed, and the solution B = G (M + rho E).
+/// @file Sparse rows of weights, and form factors made reciprocal and closed.
 #pragma once
 
 #include <xmmintrin.h>
@@ -64,13 +64,5 @@ struct TransferDefects {
 /// without entries stay empty.
 TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<float>& areas,
                                 const std::vector<float>& row_sums);
-
-/// Irradiance of each patch in E = direct + (F + K) B with B = emitted + rho E, by Gauss-Seidel sweeps until the flux
-/// still in flight is below `tolerance` of all flux. Returns the number of sweeps; throws std::runtime_error when
-/// `maximum_sweeps` do not suffice.
-int solve_interreflection(const SparseRows& form_factors, const SparseRows& through,
-                          const std::vector<glm::vec3>& reflectance, const std::vector<glm::vec3>& emitted,
-                          const std::vector<glm::vec3>& direct, const std::vector<float>& areas, double tolerance,
-                          int maximum_sweeps, std::vector<glm::vec3>& irradiance);
 
 }  // namespace transom
