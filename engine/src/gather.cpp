@@ -52,10 +52,12 @@ void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint
   std::vector<Share>& reached = row.reached;
   reached.reserve(static_cast<std::size_t>(count));
   std::vector<int> open_bins;
+  auto next = order.begin();
   for (int begin = 0; begin < count; begin += kBlock) {
     const int size = std::min(kBlock, count - begin);
     for (int i = 0; i < size; ++i) {
-      const glm::vec4 u = points.point4(order[static_cast<std::size_t>(begin + i)]);
+      while (*next >= static_cast<std::uint32_t>(count)) ++next;
+      const glm::vec4 u = points.point4(*next++);
       const Origin origin = origin_of(glm::vec2(u.z, u.w));
       rays[i] = {origin.position, frame_from_normal(origin.normal) * sample_cosine_hemisphere({u.x, u.y})};
     }
@@ -121,8 +123,9 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
     const glm::vec3 normal = mesh_.faces().faces[t.face].normal;
     glm::vec3 seen_from = middle.position;
     SphericalTriangle seen = triangle_from(t, seen_from);
-    for (int i = 0; i < n; ++i) {
-      const glm::vec4 u = points.point4(order[static_cast<std::size_t>(i)]);
+    for (const std::uint32_t index : order) {
+      if (index >= static_cast<std::uint32_t>(n)) continue;
+      const glm::vec4 u = points.point4(index);
       const Origin origin = origin_of(glm::vec2(u.z, u.w));
       if (origin.position != seen_from) seen = triangle_from(t, seen_from = origin.position);
       glm::vec3 to_opening;

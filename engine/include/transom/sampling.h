@@ -30,8 +30,9 @@ class SobolSequence {
   std::array<std::uint32_t, 4> seeds_;  // by dimension
 };
 
-/// The first `count` indices of a Sobol sequence in an order in which each sixteen lie close together in the first two
-/// dimensions, whatever the seed: scrambling moves cells of the square as a whole. For rays traced in packets.
+/// The indices of a Sobol sequence below the least power of two that holds `count`, in an order in which each sixteen
+/// lie close together in the first two dimensions, whatever the seed: scrambling moves cells of the square as a whole.
+/// For rays traced in packets; leave out those from `count` on.
 const std::vector<std::uint32_t>& coherent_order(int count);
 
 /// Maps the unit square to the unit disc, preserving area and neighbourhood [Shirley & Chiu 1997].
