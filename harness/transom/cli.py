@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import typer
 
-from transom.commands import judging, listing, picture, running, sensing
+from transom.commands import benching, checking, judging, listing, picture, products, running, sensing, status, tracing
 from transom.errors import InputError
 
 WRONG_USE = 2
@@ -34,9 +34,15 @@ COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
     "render": (picture.render, "One picture of a scene, as .exr or .png."),
     "sensors": (sensing.sensors, "Illuminance at points, as .csv."),
     "run": (running.run, "Render, compare and judge a suite; or the references."),
+    "status": (status.status, "The state of every case of a suite."),
     "compare": (judging.compare, "Compare a suite's runs with their references."),
     "judge": (judging.judge, "Judge a compared suite by the tolerances."),
     "report": (judging.report, "Run and time everything; write the report."),
+    "bench": (benching.bench, "Time a scene; or two builds against each other."),
+    "trace": (tracing.trace, "Where the time goes, for Perfetto."),
+    "bsdf": (products.bsdf, "Check a product's BSDF file; export it as Klems XML."),
+    "check": (checking.check, "Has accuracy changed? References, and our own baseline."),
+    "bless": (checking.bless, "Accept the present answers as a suite's baseline."),
     "list": (listing.list_names, "List scenes, views, suites or products."),
     "doctor": (listing.doctor, "Say what the set-up looks like."),
 }

@@ -50,7 +50,8 @@ class ImageComparison:
 
     reference_mean_standard_error_cd_m2: of the region's mean. reference_standard_error_percent: mean over the pixels of
     the reference's own relative standard error. mean_relative_error_percent, block_*: extrapolated to no noise, with
-    the standard uncertainty that noise and extrapolation leave; *_raw: against the noisy reference. block_*: quantiles
+    its standard error; *_extrapolation: bound on what that left of the noise; *_raw: against the noisy reference.
+    block_*: quantiles
     of |relative error| over blocks of 4x4 pixels. pixel_*, share_within_*: of pixels, raw. relative_rmse_percent: from
     independent halves, unbiased by noise, as a share of the reference's mean; None where it is below the noise.
     dark_pixel_count: pixels where the reference is below the floor; light_leak_percent: our light in excess there, as a
@@ -92,6 +93,8 @@ class ImageComparison:
     block_p95_raw_percent: float = 0.0
     block_p95_standard_error_percent: float = 0.0
     block_p95_numerical_percent: float | None = None
+    mean_relative_error_extrapolation_percent: float = 0.0
+    block_p95_extrapolation_percent: float = 0.0
     pixel_p50_percent: float = 0.0
     pixel_p95_percent: float = 0.0
     pixel_p99_percent: float = 0.0
@@ -212,6 +215,8 @@ def compare_region(
         block_p95_raw_percent=100 * blocks[1].raw,
         block_p95_standard_error_percent=100 * blocks[1].standard_error,
         block_p95_numerical_percent=numerical[2],
+        mean_relative_error_extrapolation_percent=100 * error.extrapolation,
+        block_p95_extrapolation_percent=100 * blocks[1].extrapolation,
         pixel_p50_percent=quantiles[0],
         pixel_p95_percent=quantiles[1],
         pixel_p99_percent=quantiles[2],

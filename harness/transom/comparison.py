@@ -72,9 +72,10 @@ class CrossCheck:
     """One quantity of one case by two references, which must agree before either judges the engine.
 
     first, second: renderers with their preset ("radiance accurate"). view: "" for sensors. quantity: "image mean",
-    "image blocks" (mean |relative difference| of 4x4 blocks, noise removed), "sensor" (one row each, region = its set
-    and number). difference_percent: of first from second, signed where the quantity has a sign. physics: "matched"
-    (what the engine simplifies, they simplify too) or "full". note: what explains a difference that is larger.
+    "image blocks" (root mean square relative difference of blocks, noise removed), "sensor" (mean relative difference
+    over a scene's checked sensors; each is in the note). difference_percent: of first from second, signed where the
+    quantity has a sign. physics: "matched" (what the engine simplifies, they simplify too) or "full". note: what
+    explains a difference that is larger, and what is too noisy to be judged.
     """
 
     scene: str
@@ -202,12 +203,14 @@ def _image_subjects(row: ImageComparison) -> list[Subject]:
         "mean_relative_error_percent": (
             row.mean_relative_error_percent,
             row.mean_relative_error_standard_error_percent,
+            row.mean_relative_error_extrapolation_percent,
             row.mean_relative_error_numerical_percent,
         ),
-        "bias_percent": (row.bias_percent, row.bias_standard_error_percent, row.bias_numerical_percent),
+        "bias_percent": (row.bias_percent, row.bias_standard_error_percent, 0.0, row.bias_numerical_percent),
         "block_p95_percent": (
             row.block_p95_percent,
             row.block_p95_standard_error_percent,
+            row.block_p95_extrapolation_percent,
             row.block_p95_numerical_percent,
         ),
     }
@@ -220,9 +223,10 @@ def _image_subjects(row: ImageComparison) -> list[Subject]:
             numerical_bias=numerical or 0.0,
             batch_count=row.reference_batch_count,
             group_count=row.reference_group_count,
+            noise_bias=noise_bias,
             fault=row.fault,
         )
-        for quantity, (value, noise, numerical) in measured.items()
+        for quantity, (value, noise, noise_bias, numerical) in measured.items()
     ]
 
 

@@ -238,6 +238,11 @@ def trace_primary(scene: Scene, view: View) -> tuple[NDArray[np.int32], Float32,
     return face, position.astype(np.float32), interior
 
 
+def build_description() -> str:
+    """Compiler, flags and libraries of the compiled engine."""
+    return str(_engine.build_description())
+
+
 def _triple(vector: Float64) -> tuple[float, float, float]:
     x, y, z = (float(v) for v in vector)
     return x, y, z

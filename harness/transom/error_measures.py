@@ -7,9 +7,8 @@ takes it away; error(N/2) is the mean over the two halves. (SIMEX: simulate what
 Cook and Stefanski 1994. Here the second noise level is measured, not simulated.) Where the noise is larger than the
 error the inflation grows like its root, and the extrapolation leaves up to (2 - sqrt 2) of it. How much of that can be
 left is bounded by a second estimate which noise can only make smaller: the error in one half, counted with the sign
-that it has in the other half, whose noise is independent. The bound enters the standard uncertainty beside what the
-noise does at random, as an evaluation of type B (GUM, JCGM 100:2008, 4.3): divided by sqrt 2, as for values that tend
-to lie at their bounds, so that k u is more than the bound for every k in use.
+that it has in the other half, whose noise is independent. The bound is kept apart from the standard error, since it is
+a bias: the judge adds it to k u, not in quadrature (GUM, JCGM 100:2008, F.2.4.5: U = k u + b for a bias not corrected).
 """
 
 from __future__ import annotations
@@ -49,11 +48,13 @@ NOISE_DRAWS = 64
 
 @dataclass(frozen=True)
 class Estimate:
-    """A share (not percent): extrapolated to no noise, as it is against the noisy reference, standard uncertainty."""
+    """A share (not percent): extrapolated to no noise, and as it is against the noisy reference; the standard error of
+    the former by noise; and bound on what the extrapolation left or took too much."""
 
     value: float
     raw: float
     standard_error: float
+    extrapolation: float
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,8 @@ class Region:
     """The luminances [cd/m²] of one region of a picture, (h, w) each; only pixels in `mask` count, and there are some.
 
     halves: independent estimates of the reference, each with half of its samples; the reference twice where it has no
-    noise. noise: standard error of a pixel. floor: added to denominators. level_error: relative standard uncertainty
-    of the reference's mean over the region, that is of what all of its pixels have in common.
+    noise. noise: standard error of a pixel, all told. floor: added to denominators. level_error: relative standard
+    uncertainty of the reference's mean over the region, that is of what all of its pixels have in common.
     """
 
     ours: Float64
@@ -101,25 +102,28 @@ def mean_relative_error(region: Region) -> Estimate:
     inflation = np.where(np.isinf(scale), 0.0, np.mean(in_halves, axis=0) - error)
     raw, extrapolated = float(error.mean()), float(error.mean() - inflation.mean())
     noise = float(np.mean(region.noise[mask] / scale))
-    excess = max(min(MEAN_EXCESS * noise, extrapolated - _least_mean_error(region)), MEAN_SHORTFALL * noise)
     tiles = tile_indices(mask)
     drawn = np.sign(signed) * (region.halves[0][mask] - region.halves[1][mask]) / (2 * scale)
     parts = (
         standard_error_of_mean(drawn, tiles),
         standard_error_of_mean(inflation - inflation.mean(), tiles),
         region.level_error,
-        excess / math.sqrt(2),
     )
-    return Estimate(max(0.0, extrapolated), raw, math.hypot(*parts))
+    standard_error = math.hypot(*parts)
+    least = _least_mean_error(region) - standard_error
+    # noise² is what noise in the denominator does at second order.
+    excess = max(min(MEAN_EXCESS * noise, extrapolated - least), MEAN_SHORTFALL * noise) + noise**2
+    return Estimate(max(0.0, extrapolated), raw, standard_error, excess)
 
 
 def block_error_quantiles(region: Region, seed: int = 0) -> list[Estimate]:
     """BLOCK_QUANTILES of |relative error| of the mean luminances of 4x4 blocks. Blocks with half of their pixels in the
     region or more count, by those pixels; a region that has none counts as one block.
 
-    The standard error comes from draws of the noise: half the difference of the halves, with a random sign by tile
-    (a wild bootstrap, Wu 1986, by clusters). It supposes that errors have no gap around the quantile: of blocks of
-    which 5 % are wrong and the others right, no noisy reference can tell the 95th percentile.
+    What twice the variance would do comes from draws of the noise that are added to the differences: half the
+    difference of the halves, with a random sign by tile (a wild bootstrap, Wu 1986, by clusters). It supposes that
+    errors have no gap around the quantile: where a twentieth of the blocks is wrong and the others are right, no noisy
+    reference can tell the 95th percentile.
     """
     kept, means = _block_means(region)
     ours, reference, half_1, half_2 = means
@@ -127,15 +131,15 @@ def block_error_quantiles(region: Region, seed: int = 0) -> list[Estimate]:
     scale = np.where(reference + region.floor > 0, reference + region.floor, np.inf)
     drawn = (half_1 - half_2) / (2 * scale)
     raw = np.percentile(np.abs(signed), BLOCK_QUANTILES)
-    in_halves = [np.percentile(np.abs(signed + step), BLOCK_QUANTILES) for step in (drawn, -drawn)]
-    extrapolated = np.clip(2 * raw - np.mean(in_halves, axis=0), 0.0, raw)
-    noise = float(np.sqrt(np.mean(drawn[np.abs(signed) >= raw[0]] ** 2)))
+    noise = math.hypot(float(np.sqrt(np.mean(drawn[np.abs(signed) >= raw[0]] ** 2))), region.level_error)
     signs = _tile_signs(kept, seed)
     draws = np.percentile(np.abs(signed + signs * drawn), BLOCK_QUANTILES, axis=1)
-    spread = np.std(draws, axis=1, ddof=1)
-    left = QUANTILE_EXCESS * noise / math.sqrt(2)
+    extrapolated = np.clip(2 * raw - draws.mean(axis=1), 0.0, raw)
+    # The extrapolated value is twice a quantile less its mean over more noise: it scatters up to twice as much.
+    spread = 2 * np.std(draws, axis=1, ddof=1)
+    left = QUANTILE_EXCESS * noise + noise**2
     return [
-        Estimate(float(value), float(plain), math.hypot(width, (1 + value) * region.level_error, left))
+        Estimate(float(value), float(plain), math.hypot(width, (1 + value) * region.level_error), left)
         for value, plain, width in zip(extrapolated, raw, spread, strict=True)
     ]
 
@@ -185,5 +189,5 @@ def _block_sums(image: Float64) -> Float64:
 def _tile_signs(kept: Bool, seed: int) -> Float64:
     """Random signs, (NOISE_DRAWS, B) for B blocks that count, alike within a tile of blocks."""
     tiles = tile_indices(kept, BLOCK_PIXELS)
-    signs = np.random.default_rng(seed).choice([-1.0, 1.0], (NOISE_DRAWS, int(tiles.max()) + 1))
-    return signs[:, tiles]
+    signs = np.random.default_rng(seed).choice([-1.0, 1.0], (NOISE_DRAWS // 2, int(tiles.max()) + 1))
+    return np.concatenate([signs, -signs])[:, tiles]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from transom.colour import luminance
+from transom.images import tone_mapped
 from transom.scene.model import Scene
 from transom.visible import FirstSurfaces
 
@@ -30,6 +31,12 @@ NO_VALUE_INDEX = 255
 """Place of that grey in the palette, after 255 steps of the scale."""
 
 SCALE_STEPS = 64
+
+CRISP = 'shape-rendering="crispEdges"'
+"""Without it the steps of a scale are drawn with seams between them."""
+
+TONE_TICKS = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Labels of a toned picture's scale, as shares of its white."""
 
 
 @dataclass(frozen=True)
@@ -62,11 +69,23 @@ class Scale:
         return {"log": "viridis", "signed": "RdBu_r", "linear": "cividis"}[self.kind]
 
 
-LUMINANCE_SCALE = Scale("luminance", "cd/m²", "log", 10, 10_000, (10, 30, 100, 300, 1000, 3000, 10_000))
+def luminance_scale(white_cd_m2: float) -> Scale:
+    """Three decades of luminance about a view's fixed white: from a hundredth of it to ten times it."""
+    low, high = white_cd_m2 / 100, white_cd_m2 * 10
+    marks = (step * 10.0**decade for decade in range(-3, 7) for step in (1, 3))
+    return Scale("luminance", "cd/m²", "log", low, high, tuple(mark for mark in marks if low <= mark <= high))
+
+
 ILLUMINANCE_SCALE = Scale("illuminance", "lx", "log", 30, 100_000, (30, 200, 500, 2000, 10_000, 100_000))
 """200 and 2000 lx are the paper's limits for reading."""
-DIFFERENCE_SCALE = Scale("signed relative difference", "%", "signed", -20, 20, (-20, -10, 0, 10, 20))
+DIFFERENCE_SCALE = Scale("signed relative difference", "%", "signed", -10, 10, (-10, -5, 0, 5, 10))
 NOISE_SCALE = Scale("standard error of the reference", "%", "linear", 0, 5, (0, 1, 2, 3, 4, 5))
+
+
+def palette(scale: Scale) -> NDArray[np.uint8]:
+    """The scale's 255 colours, sRGB (255, 3)."""
+    colours = np.asarray(mpl.colormaps[scale.map_name](np.linspace(0, 1, NO_VALUE_INDEX)))[:, :3]
+    return np.round(255 * colours).astype(np.uint8)
 
 
 def false_colour_png(values: NDArray[np.floating], scale: Scale) -> bytes:
@@ -74,10 +93,8 @@ def false_colour_png(values: NDArray[np.floating], scale: Scale) -> bytes:
     position = scale.position(values)
     unknown = np.isnan(position)
     indices = np.where(unknown, NO_VALUE_INDEX, np.round(np.nan_to_num(position) * (NO_VALUE_INDEX - 1)))
-    colours = np.asarray(mpl.colormaps[scale.map_name](np.linspace(0, 1, NO_VALUE_INDEX)))[:, :3]
-    palette = np.vstack([np.round(255 * colours), np.full(3, NO_VALUE_GREY)]).astype(np.uint8)
     picture = Image.fromarray(indices.astype(np.uint8), "P")
-    picture.putpalette(palette.tobytes())
+    picture.putpalette(palette(scale).tobytes() + bytes([NO_VALUE_GREY] * 3))
     stream = io.BytesIO()
     picture.save(stream, "PNG", optimize=True)
     return stream.getvalue()
@@ -85,20 +102,33 @@ def false_colour_png(values: NDArray[np.floating], scale: Scale) -> bytes:
 
 def scale_svg(scale: Scale) -> str:
     """The printed scale: a bar with its ticks, quantity and unit, as inline SVG that follows the page's font."""
-    width, left, bar = 320, 18, 284
     colours = mpl.colormaps[scale.map_name](np.linspace(0, 1, SCALE_STEPS))
-    step = bar / SCALE_STEPS
+    positions = [float(position) for position in scale.position(np.array(scale.ticks, float))]
+    labels = [(position, _tick(value, scale)) for position, value in zip(positions, scale.ticks, strict=True)]
+    return _bar_svg([mpl.colors.to_hex(colour) for colour in colours], labels, f"{scale.quantity} [{scale.unit}]")
+
+
+def tone_scale_svg(white_cd_m2: float) -> str:
+    """The printed scale of toned pictures: greys from black to the view's fixed white, as they are shown."""
+    shares = np.linspace(0, 1, SCALE_STEPS)
+    greys = tone_mapped(np.repeat((shares * white_cd_m2)[None, :, None], 3, axis=2), white_cd_m2)[0, :, 0]
+    labels = [(share, f"{white_cd_m2 * share:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}")) for share in TONE_TICKS]
+    colours = [f"#{level:02x}{level:02x}{level:02x}" for level in (int(grey) for grey in greys)]
+    return _bar_svg(colours, labels, "luminance [cd/m²], linear; brighter is white")
+
+
+def _bar_svg(colours: Sequence[str], labels: Sequence[tuple[float, str]], title: str) -> str:
+    """A bar of colours with labels at places 0..1 along it."""
+    width, left, bar = 320, 18, 284
+    step = bar / len(colours)
     parts = [
-        f'<rect x="{left + index * step:.2f}" y="0" width="{step + 0.3:.2f}" height="9" '
-        f'fill="{mpl.colors.to_hex(colour)}"/>'
+        f'<rect x="{left + index * step:.2f}" y="0" width="{step + 0.3:.2f}" height="9" fill="{colour}" {CRISP}/>'
         for index, colour in enumerate(colours)
     ]
-    positions = scale.position(np.array(scale.ticks, float))
-    for value, position in zip(scale.ticks, positions, strict=True):
-        x = left + bar * float(position)
+    for position, label in labels:
+        x = left + bar * position
         parts.append(f'<path d="M{x:.1f} 9v3" stroke="currentColor"/>')
-        parts.append(f'<text x="{x:.1f}" y="22" text-anchor="middle">{_tick(value, scale)}</text>')
-    title = f"{scale.quantity} [{scale.unit}]"
+        parts.append(f'<text x="{x:.1f}" y="22" text-anchor="middle">{label}</text>')
     return (
         f'<svg class="scale" viewBox="0 0 {width} 36" role="img" aria-label="{title}">{"".join(parts)}'
         f'<text x="{left + bar / 2}" y="34" text-anchor="middle" class="quantity">{title}</text></svg>'

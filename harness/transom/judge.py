@@ -7,6 +7,7 @@ T the tolerance stated beforehand in scenes/tolerances.toml, and k the one-sided
 
 k is Student's quantile (batches - 1 degrees of freedom) at the level that Sidak's formula leaves each of the m
 quantities judged together, 1 - (1 - alpha)^(1/m): noise alone turns one of them from right to wrong with chance alpha.
+What noise leaves in a quantity beside its scatter is added to k u: U = k u + b (GUM, F.2.4.5), and U takes its place.
 One side is enough: a wrong PASS needs an error beyond T on its own side. A wrong FAIL has that chance as long as
 u <= T; a reference that is noisier is not good enough, which is said beside its verdict.
 """
@@ -47,6 +48,7 @@ Quantity = Literal[
     "crosscheck_image_percent",
     "crosscheck_sensor_percent",
     "baseline_percent",
+    "baseline_seed_percent",
     "sun_edge_mm",
     "energy_percent",
     "broken_claims",
@@ -152,6 +154,7 @@ class Subject:
     """One quantity to be judged. difference: engine minus reference; uncertainty: the reference's standard uncertainty;
     numerical_bias: the engine's own; all in percent. batch_count: batches of the reference, 0 for one without noise.
     group_count: groups of batches whose spread the uncertainty is from, 0 for every batch by itself.
+    noise_bias: bound on what the reference's noise leaves in the difference beside its scatter; falls with it.
     fault: what makes the engine's value wrong whatever the reference says; it fails, with or without a tolerance."""
 
     quantity: str
@@ -166,6 +169,7 @@ class Subject:
     numerical_bias: float = 0.0
     batch_count: int = 0
     group_count: int = 0
+    noise_bias: float = 0.0
     fault: str = ""
 
     def place(self) -> str:
@@ -195,9 +199,10 @@ class Aim:
 
 @dataclass(frozen=True)
 class Verdict:
-    """The decision on one quantity. expanded_uncertainty: k u [%]. batches_needed: of the reference, to decide an
-    inconclusive one with a chance of 90 %, if the difference is what was seen (None where more of them would not).
-    reference_is_good_enough: k u <= T/3. aims: the rule's, not judged."""
+    """The decision on one quantity. expanded_uncertainty: k u, and what noise leaves beside its scatter [%].
+    batches_needed: of the reference, to decide an inconclusive one with a chance of 90 %, if the difference is what was
+    seen (None where more of them would not). reference_is_good_enough: expanded_uncertainty <= T/3. aims: the rule's,
+    not judged."""
 
     outcome: Outcome
     quantity: str
@@ -313,7 +318,7 @@ def exit_code(verdicts: Iterable[Verdict]) -> int:
 
 def _judge_one(subject: Subject, rule: Tolerance | None, alpha: float, quantity_count: int) -> Verdict:
     factor = coverage_factor(alpha, quantity_count, subject.group_count or subject.batch_count)
-    expanded = math.inf if math.isinf(factor) else factor * subject.uncertainty
+    expanded = math.inf if math.isinf(factor) else factor * subject.uncertainty + subject.noise_bias
 
     def outcome_by(bound: float) -> Outcome:
         if subject.fault:
@@ -347,14 +352,14 @@ def _judge_one(subject: Subject, rule: Tolerance | None, alpha: float, quantity_
 def _batches_needed(subject: Subject, factor: float, tolerance: float) -> int | None:
     """Batches at which the verdict is decided with DECIDING_CHANCE, if the true difference is what was seen.
 
-    u falls as 1/sqrt(batches), and the difference that will be seen then scatters by it: k u and the scatter on the
-    side of the tolerance must fit between the difference and the tolerance.
+    u and the noise's bias fall as 1/sqrt(batches), and the difference that will be seen then scatters by u: both, and
+    the scatter on the side of the tolerance, must fit between the difference and the tolerance.
     """
     size, bias = abs(subject.difference), subject.numerical_bias
     room = max(tolerance - size - bias, size - bias - tolerance)
     if room <= 0 or subject.batch_count < 2:
         return None
-    wanted = (factor + float(stats.norm.ppf(DECIDING_CHANCE))) * subject.uncertainty
+    wanted = (factor + float(stats.norm.ppf(DECIDING_CHANCE))) * subject.uncertainty + subject.noise_bias
     return max(subject.batch_count + 1, math.ceil(subject.batch_count * (wanted / room) ** 2))
 
 

@@ -78,6 +78,7 @@ class Renderer(Protocol):
 RENDERERS: dict[str, str] = {
     "engine": "transom.engine_renderer:EngineRenderer",
     "mitsuba": "transom_reference.mitsuba_renderer:MitsubaRenderer",
+    "radiance": "transom_reference.radiance_renderer:RadianceRenderer",
 }
 
 

@@ -131,9 +131,10 @@ def _render(
         return _render_in_batches(renderer, question, store, progress, started, keep_batches)
     if case.view is not None:
         image = renderer.render(case.scene, case.condition, case.view, case.options, progress)
+        is_engine = renderer.name == "engine"  # Engine pictures are compared bit by bit with one another.
         facts, trace = _without_trace(image.facts)
         seconds = time.perf_counter() - started
-        return store.write(case, image=image, facts=facts, trace=trace, wall_seconds=seconds, half=False)
+        return store.write(case, image=image, facts=facts, trace=trace, wall_seconds=seconds, half=not is_engine)
     table, facts = _measure(renderer, case, case.options, progress)
     return store.write(case, sensors=table, facts=facts, wall_seconds=time.perf_counter() - started)
 

@@ -35,7 +35,8 @@ class SuiteEntry(BaseModel):
 
     width: pictures are this wide and keep their view's proportions; omitted: the view's own size.
     reference: who knows the truth. layout: how a report shows it, view by view or as a grid of hours.
-    report: whether the report runs it.
+    report: whether the report runs it. known: cases with a known answer that are drawn in code (transom.known.suite).
+    programs: renderers that a suite of known answers judges.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
@@ -44,9 +45,11 @@ class SuiteEntry(BaseModel):
     description: str = ""
     target_percent: float = Field(default=1.0, gt=0.0)
     width: int | None = Field(default=None, gt=0)
-    reference: Literal["mitsuba", "closed_form"] = "mitsuba"
+    reference: Literal["mitsuba", "closed_form", "crosscheck"] = "mitsuba"
     layout: Literal["views", "hours"] = "views"
     report: bool = True
+    known: list[str] = []
+    programs: list[str] = ["engine"]
     cases: list[CaseEntry] = Field(min_length=1)
 
 
@@ -80,6 +83,8 @@ class Suite:
     reference: str
     layout: str
     cases: tuple[SuiteCase, ...]
+    known: tuple[str, ...] = ()
+    programs: tuple[str, ...] = ("engine",)
 
 
 def suites_file() -> Path:
@@ -107,7 +112,15 @@ def load_suite(name: str, path: Path | None = None) -> Suite:
     entry = suites[name]
     cases = [case for line in entry.cases for case in _cases(line, entry.width)]
     return Suite(
-        name, entry.title, entry.description, entry.target_percent, entry.reference, entry.layout, tuple(cases)
+        name,
+        entry.title,
+        entry.description,
+        entry.target_percent,
+        entry.reference,
+        entry.layout,
+        tuple(cases),
+        tuple(entry.known),
+        tuple(entry.programs),
     )
 
 

@@ -15,18 +15,18 @@ from transom.claims import CaseBusyError
 from transom.compare import CaseNames, ImageComparison, SensorComparison, compare_images, compare_sensors
 from transom.comparison import (
     COMPARISON_FORMAT,
-    AnalyticComparison,
     Comparison,
     MethodAgreement,
     compare_methods,
     read_comparison,
     write_comparison,
 )
+from transom.crosscheck import compare_references, render_references
 from transom.errors import InputError, StorageError
 from transom.failures import error_words, read_failure
 from transom.files import write_atomic
 from transom.judge import Missing, Outcome, Verdict, exit_code, judge, read_tolerances
-from transom.known_answers import compare_known_answer
+from transom.known.suite import compare_known, program_table
 from transom.progress import CaseProgress
 from transom.renderer import ImageResult, Renderer, load_renderer
 from transom.run import COARSE_VISIBILITY, Question, coarse_options, engine_questions, free_first, render_case
@@ -65,15 +65,18 @@ def run_suite(name: str, scenes: Collection[str], build: Path = Path("build"), *
     compare_suite(suite, build, render_suite(suite, fresh=fresh))
     verdicts = judge_compared(name, build)
     print_verdicts(verdicts)
+    if suite.reference == "closed_form":
+        _console().print(program_table(verdicts))
     return exit_code(verdicts)
 
 
 def chosen(suite: Suite, scenes: Collection[str]) -> Suite:
     """The suite's cases of some scenes (none given: all). Raises InputError when none is left."""
     cases = tuple(case for case in suite.cases if not scenes or case.scene.name in scenes)
-    if not cases:
+    known = tuple(name for name in suite.known if not scenes or name in scenes)
+    if not cases and not known:
         raise InputError(f"is no scene of suite {suite.name}", field="--scene", value=", ".join(sorted(scenes)))
-    return replace(suite, cases=cases)
+    return replace(suite, cases=cases, known=known)
 
 
 def render_suite(suite: Suite, *, fresh: bool = False) -> list[Crash]:
@@ -81,6 +84,8 @@ def render_suite(suite: Suite, *, fresh: bool = False) -> list[Crash]:
     more files does (StorageError)."""
     if suite.reference == "closed_form":
         return []
+    if suite.reference == "crosscheck":
+        return [Crash(question, message) for question, message in render_references(suite, fresh=fresh)]
     renderer = load_renderer(ENGINE)
     return render_questions(renderer, list(engine_questions(suite, renderer, VISIBILITIES)), suite.name, fresh=fresh)
 
@@ -124,19 +129,22 @@ def compare_finished(name: str, build: Path) -> Comparison:
 
 def stored_failures(suite: Suite) -> list[Crash]:
     """The cases of a suite that failed when they were last rendered, as their failure bundles say."""
-    if suite.reference == "closed_form":
+    if suite.reference != "mitsuba":
         return []
     questions = engine_questions(suite, load_renderer(ENGINE), VISIBILITIES)
     found = ((question, read_failure(question.case)) for question in questions)
     return [Crash(question, failure.error) for question, failure in found if failure is not None]
 
 
-def compare_suite(suite: Suite, build: Path, crashes: Collection[Crash]) -> Comparison:
-    """Compares every case with its reference and writes comparison.json."""
+def compare_suite(suite: Suite, build: Path, crashes: Collection[Crash], engine: Renderer | None = None) -> Comparison:
+    """Compares every case with its reference and writes comparison.json. engine: another than the engine itself."""
     if suite.reference == "closed_form":
-        comparison = _compare_with_truth(suite)
+        comparison = compare_known(suite)
+    elif suite.reference == "crosscheck":
+        comparison = compare_references(suite, {crash.question.case.key: crash.message for crash in crashes})
     else:
-        comparison = _compare_with_mitsuba(suite, {crash.question.case.key: crash.message for crash in crashes})
+        failed = {crash.question.case.key: crash.message for crash in crashes}
+        comparison = _compare_with_mitsuba(suite, failed, engine or load_renderer(ENGINE))
     write_comparison(comparison_file(suite.name, build), comparison)
     return comparison
 
@@ -161,12 +169,16 @@ def print_verdicts(verdicts: Collection[Verdict]) -> None:
         numbers = (verdict.difference, verdict.numerical_bias, verdict.expanded_uncertainty, verdict.tolerance)
         cells = ["" if number is None else f"{number:.3g}" for number in numbers]
         table.add_row(verdict.outcome, verdict.quantity or verdict.reason, case, *cells)
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=LOG_WIDTH)
+    console = _console()
     console.print(table)
     counts = {outcome: sum(verdict.outcome is outcome for verdict in verdicts) for outcome in Outcome}
     console.print(", ".join(f"{count} {outcome}" for outcome, count in counts.items() if count) or "nothing judged")
+
+
+def _console() -> Console:
+    """Standard output; tables that go to a file have room."""
+    console = Console()
+    return console if console.is_terminal else Console(width=LOG_WIDTH)
 
 
 @dataclass
@@ -179,22 +191,8 @@ class _Found:
     missing: list[Missing]
 
 
-def _compare_with_truth(suite: Suite) -> Comparison:
-    """Scenes with a known answer; one that fails does not stop the others."""
-    renderer = load_renderer(ENGINE)
-    rows: list[AnalyticComparison] = []
-    missing: list[Missing] = []
-    for entry in suite.cases:
-        try:
-            rows += compare_known_answer(entry, renderer)
-        except Exception as error:
-            place = (entry.scene.name, "", entry.condition.name, "")
-            missing.append(Missing(Outcome.CRASHED, *place, error_words(error)))
-    return Comparison(COMPARISON_FORMAT, suite.name, suite.title, analytic=tuple(rows), missing=tuple(missing))
-
-
-def _compare_with_mitsuba(suite: Suite, crashed: Mapping[str, str]) -> Comparison:
-    engine, mitsuba = load_renderer(ENGINE), load_renderer("mitsuba")
+def _compare_with_mitsuba(suite: Suite, crashed: Mapping[str, str], engine: Renderer) -> Comparison:
+    mitsuba = load_renderer("mitsuba")
     found = _Found([], [], [], [])
     for entry in suite.cases:
         if entry.sensors:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -126,3 +128,62 @@ class NoisyRenderer:
 def grey(values: NDArray[np.floating]) -> NDArray[np.float32]:
     """(..., ) -> (..., 3): equal red, green and blue, whose luminance is the value."""
     return np.repeat(np.asarray(values, np.float32)[..., None], 3, axis=-1)
+
+
+CHEAP_FACTS = {"energy_imbalance": 1e-4, "sweeps": 12, "interior_patches": 300, "nodes": 900, "faces": 6}
+
+
+class CheapEngine:
+    """Takes the engine's place: a level that depends on the scene's reflectance, and a note of every case it renders.
+
+    $CHEAP_ENGINE_LOG: file to which each finished rendering adds a line; $CHEAP_ENGINE_SECONDS: how long one takes;
+    $CHEAP_ENGINE_FAILS: condition whose rendering raises an error; $CHEAP_ENGINE_SKY, $CHEAP_ENGINE_INDIRECT: factors
+    on these components; $CHEAP_ENGINE_SPREAD: relative noise of a pixel, by seed.
+    """
+
+    name = "engine"
+    version = "cheap-1"
+
+    def default_options(self) -> dict[str, Any]:
+        return {"visibility": "rays", "seed": 1, "sensor_rays": 16, "sensor_opening_rays": 16}
+
+    def render(
+        self,
+        scene: Scene,
+        condition: Condition,
+        view: View,
+        options: Mapping[str, Any],
+        progress: Progress | None = None,  # noqa: ARG002
+    ) -> ImageResult:
+        level = self._level(scene, condition)
+        shape = (view.height, view.width, 3)
+        random = np.random.default_rng(int(options["seed"]))
+        spread = float(os.environ.get("CHEAP_ENGINE_SPREAD", "0"))
+        parts = {name: np.zeros(shape, np.float32) for name in ("sun", "emitted", "exterior")}
+        for name, share in (("sky", 0.4), ("indirect", 0.6)):
+            changed = float(os.environ.get(f"CHEAP_ENGINE_{name.upper()}", "1"))
+            noise = 1 + spread * random.standard_normal(shape[:2])
+            parts[name] = grey(level * share * changed * noise)
+        return ImageResult(sum(parts.values(), np.zeros(shape, np.float32)), components=parts, facts=CHEAP_FACTS)
+
+    def illuminance(
+        self,
+        scene: Scene,
+        condition: Condition,
+        points: NDArray[np.float64],
+        normals: NDArray[np.float64],  # noqa: ARG002
+        options: Mapping[str, Any],  # noqa: ARG002
+        progress: Progress | None = None,  # noqa: ARG002
+    ) -> SensorResult:
+        values = np.full((len(points), 3), self._level(scene, condition))
+        return SensorResult(values, np.zeros(len(points)), CHEAP_FACTS)
+
+    def _level(self, scene: Scene, condition: Condition) -> float:
+        time.sleep(float(os.environ.get("CHEAP_ENGINE_SECONDS", "0")))
+        if os.environ.get("CHEAP_ENGINE_FAILS") == condition.name:
+            raise ArithmeticError("light went backwards")
+        log = os.environ.get("CHEAP_ENGINE_LOG")
+        if log is not None:
+            with Path(log).open("a") as stream:
+                stream.write(f"{scene.name} {condition.name}\n")
+        return 200.0 * scene.materials[0].reflectance[0]

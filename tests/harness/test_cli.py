@@ -8,7 +8,7 @@ import pytest
 
 from transom.cli import WRONG_USE, run_command
 
-COMMANDS = ("render", "sensors", "run", "compare", "judge", "report", "list", "doctor")
+COMMANDS = ("render", "sensors", "run", "compare", "judge", "report", "bench", "trace", "list", "doctor")
 
 
 def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,133 +4,24 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from harness_fakes import NoisyRenderer, grey, small_scene
-from numpy.typing import NDArray
+from report_project import FakeEngine, make_project, render_references
 
-from transom.bundle import repository_store
-from transom.daylight.condition import Condition
-from transom.figures import DIFFERENCE_SCALE, LUMINANCE_SCALE, TimingBar, false_colour_png, scale_svg, timings_svg
+from transom.figures import DIFFERENCE_SCALE, TimingBar, false_colour_png, luminance_scale, scale_svg, timings_svg
 from transom.images import tone_mapped
-from transom.renderer import ImageResult, Progress, SensorResult
 from transom.report.build import write_report
 from transom.report.numbers import fixed, rounded, seconds, signed
-from transom.report.results import SCHEMA_FILE, Results, results_schema
-from transom.run import reference_questions, render_case
-from transom.scene.model import Scene, View
-from transom.suite import load_suite
+from transom.report.results import SCHEMAS, Results, schema_texts
 from transom.timing import Timing, write_timings
-from transom.visible import FirstSurfaces
-
-SUITES = """
-format = 1
-[suites.rooms]
-title = "Rooms"
-target_percent = 5.0
-cases = [{ scene = "small", views = ["*"] }]
-[suites.hours]
-title = "Hours"
-layout = "hours"
-width = 6
-target_percent = 9.0
-cases = [{ scene = "small", sensors = false }]
-"""
-
-TOLERANCES = """
-format = 1
-[[tolerances]]
-quantity = "mean_relative_error_percent"
-tolerance = 8.0
-reason = "stated"
-[[tolerances]]
-quantity = "bias_percent"
-tolerance = 3.0
-reason = "stated"
-[[tolerances]]
-quantity = "sensor_percent"
-tolerance = 3.0
-reason = "stated"
-"""
-
-
-class FakeEngine:
-    """An engine that is `error` too bright everywhere, and crashes on request."""
-
-    name = "engine"
-    version = "fake"
-    error = 0.01
-    crashes = False
-
-    def default_options(self) -> dict[str, Any]:
-        return {"visibility": "rays"}
-
-    def render(
-        self,
-        scene: Scene,  # noqa: ARG002
-        condition: Condition,  # noqa: ARG002
-        view: View,
-        options: Mapping[str, Any],  # noqa: ARG002
-        progress: Progress | None = None,  # noqa: ARG002
-    ) -> ImageResult:
-        if self.crashes:
-            raise RuntimeError("the fake engine was asked to crash")
-        picture = grey(np.full((view.height, view.width), 100 * (1 + self.error)))
-        return ImageResult(picture, components={"sun": 0.25 * picture, "sky": 0.75 * picture})
-
-    def illuminance(
-        self,
-        scene: Scene,  # noqa: ARG002
-        condition: Condition,  # noqa: ARG002
-        points: NDArray[np.float64],
-        normals: NDArray[np.float64],  # noqa: ARG002
-        options: Mapping[str, Any],  # noqa: ARG002
-        progress: Progress | None = None,  # noqa: ARG002
-    ) -> SensorResult:
-        return SensorResult(np.full((len(points), 3), 100 * (1 + self.error)), np.zeros(len(points)))
 
 
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A project of one small scene, with fake renderers and timings."""
-    scenes = tmp_path / "scenes"
-    scenes.mkdir()
-    (scenes / "suites.toml").write_text(SUITES)
-    (scenes / "tolerances.toml").write_text(TOLERANCES)
-    renderers = {"engine": FakeEngine(), "mitsuba": NoisyRenderer(relative_noise=0.02)}
-
-    def surfaces(_: Scene, view: View) -> FirstSurfaces:
-        shape = (view.height, view.width)
-        interior = np.ones(shape, bool)
-        interior[0] = False
-        return FirstSurfaces(np.where(interior, 0, -1).astype(np.int32), np.zeros((*shape, 3), np.float32), interior)
-
-    monkeypatch.setattr("transom.bundle._engine_build", lambda: "fake")
-    monkeypatch.setattr("transom.suite.load_scene", lambda _: small_scene())
-    monkeypatch.setattr("transom.suite.scene_root", lambda: scenes)
-    monkeypatch.setattr("transom.workflow.scene_root", lambda: scenes)
-    for module in ("workflow", "report.pictures"):
-        monkeypatch.setattr(f"transom.{module}.load_renderer", renderers.__getitem__)
-    for module in ("run", "visible", "report.pictures"):
-        monkeypatch.setattr(f"transom.{module}.first_surfaces", surfaces)
-    timings = [
-        Timing("small", "solve", "s", 1.0, 0.9, 1.1, 3, 2, 40),
-        Timing("small", "relight", "s", 2e-3, 1e-3, 3e-3, 9, 2, 40),
-    ]
-    monkeypatch.setattr("transom.report.build.time_scenes", lambda *_: timings)
-    return tmp_path
-
-
-def render_references() -> None:
-    renderer = NoisyRenderer(relative_noise=0.02)
-    for name in ("rooms", "hours"):
-        for question in reference_questions(load_suite(name), renderer, {}):
-            render_case(renderer, question, repository_store())
+    return make_project(tmp_path, monkeypatch)
 
 
 class PageReader(HTMLParser):
@@ -162,8 +53,8 @@ def test_report_is_one_offline_page_with_every_picture_in_it(project: Path) -> N
     page = (project / "report" / "index.html").read_text()
     reader = PageReader()
     reader.feed(page)
-    assert len(reader.sources) >= 8 + 2 + 6
-    assert all(source.startswith("data:image/png;base64,") for source in reader.sources)
+    assert len(reader.sources) == 3 + 2 + 6, "a viewer, a moment, a strip"
+    assert all(re.match("data:image/webp;base64,", source) for source in reader.sources)
     assert reader.images_without_alt == 0
     assert all(link.removeprefix("#") in reader.anchors for link in reader.links)
     assert not re.search(r"(src|href)\s*=\s*[\"']?https?:|url\(\s*[\"']?https?:|@import", page)
@@ -198,8 +89,9 @@ def test_results_are_in_their_schema_and_carry_the_required_fields(project: Path
     assert [row["verdict"] for row in plain["sensors"]] == ["PASS", "PASS"]
 
 
-def test_schema_in_the_repository_is_the_one_that_results_follow() -> None:
-    assert SCHEMA_FILE.read_text() == results_schema(), "write it anew: transom.report.results.write_schema()"
+def test_schemas_in_the_repository_are_those_that_the_files_follow() -> None:
+    for name, text in schema_texts().items():
+        assert (SCHEMAS / name).read_text() == text, "write them anew: transom.report.results.write_schemas()"
 
 
 def test_missing_references_are_verdicts_and_exit_code_4(project: Path) -> None:
@@ -269,14 +161,14 @@ def test_tone_mapping_has_a_fixed_scale() -> None:
 
 
 def test_equal_values_have_equal_colours_in_different_pictures() -> None:
-    first = false_colour_png(np.array([[10.0, 100.0, 1000.0]]), LUMINANCE_SCALE)
-    second = false_colour_png(np.array([[10.0, 100.0, 1000.0]]), LUMINANCE_SCALE)
+    first = false_colour_png(np.array([[10.0, 100.0, 1000.0]]), luminance_scale(1000.0))
+    second = false_colour_png(np.array([[10.0, 100.0, 1000.0]]), luminance_scale(1000.0))
     assert first == second
     position = DIFFERENCE_SCALE.position(np.array([-50.0, 0.0, 50.0, np.nan]))
     np.testing.assert_array_equal(position, [0.0, 0.5, 1.0, np.nan])
 
 
 def test_scales_and_timings_are_svg_with_units() -> None:
-    assert "luminance [cd/m²]" in scale_svg(LUMINANCE_SCALE)
+    assert "luminance [cd/m²]" in scale_svg(luminance_scale(1000.0))
     text = timings_svg([TimingBar("room: relight", 1e-3, 2e-3, (1.0, 3.0))])
     assert text.startswith("<svg") and "time [s]" in text

@@ -20,6 +20,7 @@ class RendererName(StrEnum):
 
     engine = "engine"
     mitsuba = "mitsuba"
+    radiance = "radiance"
 
 
 class Method(StrEnum):

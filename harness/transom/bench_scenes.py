@@ -1,0 +1,74 @@
+"""Variants of a scene for speed sweeps: more panes of the same area, one pane alone, other glass."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transom.scene.model import Mesh, Scene
+
+
+def opening_face_count(scene: Scene) -> int:
+    """Faces of panes."""
+    return int(_is_opening(scene).sum())
+
+
+def with_panes(scene: Scene, split: int) -> Scene:
+    """The scene with each four-cornered pane cut into split x split; split 0: every pane but the first is closed.
+
+    Closed panes take the opaque material that most faces have. Cut panes keep their area and their group.
+    """
+    opening = _is_opening(scene)
+    if split == 0:
+        opaque = [index for index, material in enumerate(scene.materials) if material.opening < 0]
+        counts = np.bincount(scene.mesh.face_material, minlength=len(scene.materials))
+        wall = max(opaque, key=lambda index: counts[index])
+        material = scene.mesh.face_material.copy()
+        material[np.flatnonzero(opening)[1:]] = wall
+        return replace(scene, mesh=replace(scene.mesh, face_material=material))
+    return replace(scene, mesh=_cut(scene.mesh, opening & (scene.mesh.faces[:, 3] >= 0), split))
+
+
+def with_other_glass(scene: Scene, share: float) -> Scene:
+    """The scene with the visible transmittance of every glazed opening multiplied by `share` (up to 1)."""
+    openings = tuple(
+        entry
+        if entry.glazing == "none"
+        else replace(entry, visible_transmittance=max(share * entry.visible_transmittance, 1e-3))
+        for entry in scene.openings
+    )
+    return replace(scene, openings=openings)
+
+
+def _is_opening(scene: Scene) -> NDArray[np.bool_]:
+    is_opening = np.array([material.opening >= 0 for material in scene.materials])
+    return np.asarray(is_opening[scene.mesh.face_material])
+
+
+def _cut(mesh: Mesh, chosen: NDArray[np.bool_], split: int) -> Mesh:
+    """The mesh with the chosen quads cut into split x split quads, appended after the others."""
+    kept = np.flatnonzero(~chosen)
+    steps = np.linspace(0.0, 1.0, split + 1)
+    vertices, faces, sources = [mesh.vertices], [mesh.faces[kept]], [kept]
+    count = len(mesh.vertices)
+    for face in np.flatnonzero(chosen):
+        a, b, c, d = mesh.vertices[mesh.faces[face]]
+        u, v = (grid[..., None] for grid in np.meshgrid(steps, steps, indexing="ij"))
+        points = (1 - u) * (1 - v) * a + u * (1 - v) * b + u * v * c + (1 - u) * v * d
+        index = count + np.arange((split + 1) ** 2).reshape(split + 1, split + 1)
+        quads = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1).reshape(-1, 4)
+        vertices.append(points.reshape(-1, 3))
+        faces.append(quads.astype(np.int32))
+        sources.append(np.full(split**2, face))
+        count += (split + 1) ** 2
+    source = np.concatenate(sources)
+    return replace(
+        mesh,
+        vertices=np.concatenate(vertices),
+        faces=np.concatenate(faces).astype(np.int32),
+        face_material=mesh.face_material[source],
+        face_object=mesh.face_object[source],
+        corner_normals=None if mesh.corner_normals is None else mesh.corner_normals[source],
+    )
