@@ -166,7 +166,9 @@ NB_MODULE(_engine, m) {
       .def_ro("node_count", &SolveFacts::node_count)
       .def_ro("maximum_edge_m", &SolveFacts::maximum_edge_m)
       .def_ro("leak_share", &SolveFacts::leak_share)
-      .def_ro("defects", &SolveFacts::defects);
+      .def_ro("defects", &SolveFacts::defects)
+      .def_ro("cluster_count", &SolveFacts::cluster_count)
+      .def_ro("link_bytes", &SolveFacts::link_bytes);
 
   nb::class_<Condition>(m, "Condition")
       .def(
@@ -253,7 +255,7 @@ NB_MODULE(_engine, m) {
           "view"_a, "visibility"_a, "edge_samples"_a, "components"_a)
       .def(
           "illuminance",
-          [](const Session& s, In<double, nb::shape<-1, 3>> points, In<float, nb::shape<-1, 3>> normals,
+          [](Session& s, In<double, nb::shape<-1, 3>> points, In<float, nb::shape<-1, 3>> normals,
              GatherSamples samples) {
             std::vector<Irradiance> e;
             {

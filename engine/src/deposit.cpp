@@ -10,8 +10,8 @@
 namespace transom {
 namespace {
 
-constexpr int kSamplesPerElement = 2;          // of a beam, to find out which elements are lit, and wholly or partly
-constexpr int kRefinedSamplesPerElement = 32;  // on elements that are partly lit, and their neighbours
+constexpr int kSamplesPerElement = 4;          // of a beam, to find out which patches are lit, and wholly or partly
+constexpr int kRefinedSamplesPerElement = 32;  // on patches that are partly lit
 constexpr int kSourceSamplesPerElement = 16;   // of point sources
 constexpr float kSameShare = 1e-3f;            // of a beam, between samples of an evenly lit element
 constexpr std::size_t kGrain = 16;
@@ -79,31 +79,36 @@ std::vector<glm::vec3> DirectLight::points_on(int slot_index, std::span<const in
   const Slot slot = mesh_.slot(slot_index);
   std::vector<glm::vec3> points;
   points.reserve(elements.size() * static_cast<std::size_t>(samples));
+  const bool is_quad = mesh_.grid(slot.face).is_quad;
+  const int edge = static_cast<int>(std::lround(std::sqrt(static_cast<float>(mesh_.elements_per_slot()))));
+  // A cell, and a quad's element in it, is the affine or bilinear picture of its own square or triangle.
+  const auto corner = [&](float u, float v) {
+    return mesh_.lifted_position(slot.face, slot.side, mesh_.cell_parameters(slot.face, slot.cell, {u, v}));
+  };
+  const glm::vec3 a = corner(0, 0), ab = corner(1, 0) - a, ac = corner(0, 1) - a,
+                  twist = is_quad ? corner(1, 1) - a - ab - ac : glm::vec3(0);
   for (const int e : elements) {
     const SobolSequence sequence(
         hash_seed(seed, static_cast<std::uint64_t>(slot_index) * mesh_.elements_per_slot() + e));
-    // An element is the affine or bilinear picture of its own square or triangle.
-    const auto corner = [&](float u, float v) {
-      return mesh_.lifted_position(slot.face, slot.side, mesh_.element_parameters(slot.face, slot.cell, e, {u, v}));
-    };
-    const bool is_quad = mesh_.grid(slot.face).is_quad;
-    const glm::vec3 a = corner(0, 0), ab = corner(1, 0) - a, ac = corner(0, 1) - a,
-                    twist = is_quad ? corner(1, 1) - a - ab - ac : glm::vec3(0);
     for (int i = 0; i < samples; ++i) {
-      const glm::vec2 u = mesh_.sample_local(slot.face, sequence.point2(static_cast<std::uint32_t>(i)));
-      points.push_back(a + u.x * ab + u.y * ac + u.x * u.y * twist);
+      const glm::vec2 local = mesh_.sample_local(slot.face, sequence.point2(static_cast<std::uint32_t>(i)));
+      if (is_quad) {
+        const glm::vec2 u = (glm::vec2(e % edge, e / edge) + local) / static_cast<float>(edge);
+        points.push_back(a + u.x * ab + u.y * ac + u.x * u.y * twist);
+      } else {
+        points.push_back(
+            mesh_.lifted_position(slot.face, slot.side, mesh_.element_parameters(slot.face, slot.cell, e, local)));
+      }
     }
   }
   return points;
 }
 
-// Mean share of a beam on each element of a slot. Few samples tell elements that are wholly lit or dark from those on
-// an edge of light; these, and all that touch them, are sampled densely.
+// Mean share of a beam on each element of a slot. Few samples tell patches that are wholly lit or dark from the others,
+// which are sampled densely throughout: light thinner than the distance of samples is then missed and found alike.
 void DirectLight::beam_on_slot(glm::vec3 direction, int slot_index, std::uint32_t seed,
                                std::vector<float>& mean) const {
   const int element_count = mesh_.elements_per_slot();
-  const bool is_quad = mesh_.grid(mesh_.slot(slot_index).face).is_quad;
-  const int edge = static_cast<int>(std::lround(std::sqrt(static_cast<float>(element_count))));
   std::vector<int> elements(static_cast<std::size_t>(element_count));
   std::iota(elements.begin(), elements.end(), 0);
   std::vector<float> share(static_cast<std::size_t>(element_count * kSamplesPerElement));
@@ -113,23 +118,6 @@ void DirectLight::beam_on_slot(glm::vec3 direction, int slot_index, std::uint32_
   const auto [least, most] = std::minmax_element(share.begin(), share.end());
   mean.assign(static_cast<std::size_t>(element_count), *most);
   if (*most - *least <= kSameShare) return;
-  const auto of = [&](int e, int i) { return share[e * kSamplesPerElement + i]; };
-  const auto differ = [&](int a, int b) {
-    for (int i = 0; i < kSamplesPerElement; ++i)
-      if (std::abs(of(a, 0) - of(b, i)) > kSameShare) return true;
-    return false;
-  };
-  elements.clear();
-  for (int e = 0; e < element_count; ++e) {
-    bool is_on_edge = !is_quad || differ(e, e);
-    for (int dy = -1; dy <= 1 && !is_on_edge; ++dy)
-      for (int dx = -1; dx <= 1 && !is_on_edge; ++dx) {
-        const int x = e % edge + dx, y = e / edge + dy;
-        is_on_edge = x >= 0 && x < edge && y >= 0 && y < edge && differ(e, y * edge + x);
-      }
-    if (is_on_edge) elements.push_back(e);
-    mean[e] = of(e, 0);
-  }
   share.resize(elements.size() * kRefinedSamplesPerElement);
   points = points_on(slot_index, elements, kRefinedSamplesPerElement, seed);
   beam_transmission(direction, points, share);

@@ -13,9 +13,9 @@ namespace transom {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
-constexpr std::size_t kBlock = 256;     // pixels or points at once
-constexpr int kLargestMask = 4096;      // pixels a side of a stencil mask
-constexpr float kSameShare = 0.02f;     // of a beam, between neighbouring pixels without an edge
+constexpr std::size_t kBlock = 256;  // pixels or points at once
+constexpr int kLargestMask = 4096;   // pixels a side of a stencil mask
+constexpr float kSameShare = 0.02f;  // of a beam, between neighbouring pixels without an edge
 
 }  // namespace
 
@@ -274,7 +274,7 @@ void FrameRenderer::render_masks(const View& view, Masks& masks) {
     volumes_ = std::make_unique<ShadowVolumes>(*context_, vertices, opaque, openings);
   }
   const glm::dvec3 origin = engine_.faces().origin;
-  const VolumeCamera camera{view.position - origin, view.target - origin,         view.up,
+  const VolumeCamera camera{view.position - origin, view.target - origin,       view.up,
                             view.vertical_fov_rad,  view.width * masks.scale(), view.height * masks.scale()};
   for (const Beam& beam : engine_.lighting().condition.beams) {
     const BeamMask mask = volumes_->render(camera, glm::dvec3(beam.direction_to_source));

@@ -63,7 +63,8 @@ void Interreflection::find_clusters(const std::vector<PatchPlace>& places) {
     for (std::size_t i = 0; i < places.size(); ++i) {
       const glm::ivec3 cell((places[i].position - low) / cube);
       cluster_of_[i] =
-          number.try_emplace({main_direction(places[i].normal), cell.x, cell.y, cell.z}, static_cast<int>(number.size()))
+          number
+              .try_emplace({main_direction(places[i].normal), cell.x, cell.y, cell.z}, static_cast<int>(number.size()))
               .first->second;
     }
     cluster_count_ = static_cast<int>(number.size());
@@ -71,7 +72,8 @@ void Interreflection::find_clusters(const std::vector<PatchPlace>& places) {
   }
 }
 
-// With F_c and rho_c averaged over clusters by area, and over colours: F_c (1 - rho_c F_c)^-1.
+// With F_c and rho_c averaged over clusters by area: F_c (1 - rho_c F_c)^-1. One for all colours, with the least of
+// their reflectances: a larger one would carry more than there is in the others, and could diverge.
 void Interreflection::find_operators() {
   using Matrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const Eigen::Index m = cluster_count_;
@@ -88,7 +90,7 @@ void Interreflection::find_operators() {
   Matrix system = Matrix::Identity(m, m);
   for (Eigen::Index c = 0; c < m; ++c) {
     const glm::vec3 rho = reflectance[c] / std::max(cluster_area_[c], 1e-30f);
-    system.row(c) -= (rho.x + rho.y + rho.z) / 3 * exchange.row(c);
+    system.row(c) -= std::min({rho.x, rho.y, rho.z}) * exchange.row(c);
   }
   const Matrix solved = exchange * system.partialPivLu().inverse();
   operator_.assign(solved.data(), solved.data() + solved.size());

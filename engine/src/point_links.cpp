@@ -69,10 +69,9 @@ glm::vec3 PointLinks::exposed_middle(int slot_index, glm::vec3 normal) const {
   }
   if (count == 0 || count == element_count) return all / static_cast<float>(element_count);
   sum /= static_cast<float>(count);
-  return std::min_element(outwards.begin(), outwards.begin() + count,
-                          [&](const Ray& a, const Ray& b) {
-                            return glm::length(a.origin - sum) < glm::length(b.origin - sum);
-                          })
+  return std::min_element(
+             outwards.begin(), outwards.begin() + count,
+             [&](const Ray& a, const Ray& b) { return glm::length(a.origin - sum) < glm::length(b.origin - sum); })
       ->origin;
 }
 
@@ -169,7 +168,7 @@ PointLinks::LitPatch PointLinks::lit_patch(const std::vector<BrightElement>& bri
   const Slot slot = mesh_.slot(slot_index);
   const Face& face = mesh_.faces().faces[slot.face];
   const glm::vec2 middle = mesh_.grid(slot.face).is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3);
-  LitPatch patch{&links_[slot_index], first,       last, glm::vec3(0), slot.side == 0 ? face.normal : -face.normal,
+  LitPatch patch{&links_[slot_index], first, last, glm::vec3(0), slot.side == 0 ? face.normal : -face.normal,
                  glm::vec3(0)};
   float sum = 0;
   for (std::size_t k = first; k < last; ++k) {
@@ -177,9 +176,8 @@ PointLinks::LitPatch PointLinks::lit_patch(const std::vector<BrightElement>& bri
     const float area = mesh_.element_area(slot.face, slot.cell, element);
     const glm::vec3 radiosity = bright[k].radiosity;
     const float weight = area * (radiosity.x + radiosity.y + radiosity.z);
-    patch.centroid +=
-        weight * mesh_.lifted_position(slot.face, slot.side,
-                                       mesh_.element_parameters(slot.face, slot.cell, element, middle));
+    patch.centroid += weight * mesh_.lifted_position(slot.face, slot.side,
+                                                     mesh_.element_parameters(slot.face, slot.cell, element, middle));
     patch.flux += area / kPi * radiosity;
     sum += weight;
   }
@@ -234,8 +232,7 @@ void PointLinks::add_irradiance(const std::vector<BrightElement>& bright, std::v
       }
       auto near = std::lower_bound(link.near_point.begin(), link.near_point.end(), static_cast<int>(base));
       for (; near != link.near_point.end() && *near < static_cast<int>(last_block * kBlock); ++near) {
-        const float* weight =
-            &link.near_weight[static_cast<std::size_t>(near - link.near_point.begin()) * per_slot];
+        const float* weight = &link.near_weight[static_cast<std::size_t>(near - link.near_point.begin()) * per_slot];
         glm::vec3 sum(0);
         for (std::size_t k = patch.first_bright; k < patch.last_bright; ++k)
           sum += weight[bright[k].element % per_slot] * bright[k].radiosity;

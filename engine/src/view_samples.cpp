@@ -142,8 +142,8 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
     const Face &f = engine.faces().faces[a.hit.face], &g = engine.faces().faces[b.hit.face];
     const float cosine = glm::dot(f.normal, g.normal) * (a.hit.side == b.hit.side ? 1.f : -1.f);
     return cosine < kSameNormal ||
-           std::abs(glm::dot(f.normal, f.corner[0]) - (a.hit.side == b.hit.side ? 1.f : -1.f) *
-                                                          glm::dot(g.normal, g.corner[0])) > same_plane;
+           std::abs(glm::dot(f.normal, f.corner[0]) -
+                    (a.hit.side == b.hit.side ? 1.f : -1.f) * glm::dot(g.normal, g.corner[0])) > same_plane;
   };
   has_edge.assign(pixel_count, 0);
   if (s > 1)
@@ -188,8 +188,8 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
     }
     for (const SeenPane& pane : panes[y])
       if (!has_edge[y * row_size + pane.ray])
-        row.on_panes.push_back(add_sample(engine, pane.seen, 1, static_cast<int>(y * row_size + pane.ray), -1,
-                                          row.smooth[pane.ray], row));
+        row.on_panes.push_back(
+            add_sample(engine, pane.seen, 1, static_cast<int>(y * row_size + pane.ray), -1, row.smooth[pane.ray], row));
     for (std::vector<Share>& shares : row.smooth) merge_shares(shares);
   });
   std::size_t share_count = 0;

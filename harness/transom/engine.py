@@ -209,6 +209,8 @@ class Engine:
             "nodes": facts.node_count,
             "maximum_edge_m": facts.maximum_edge_m,
             "leak_share": facts.leak_share,
+            "clusters": facts.cluster_count,
+            "link_bytes": facts.link_bytes,
             "form_factor_defects": {
                 "raw_reciprocity": defects.raw_reciprocity,
                 "raw_row_sum": defects.raw_row_sum,
@@ -229,7 +231,7 @@ class Engine:
 
     @property
     def sweeps(self) -> int:
-        """Gauss-Seidel sweeps of the last relighting."""
+        """Cycles of interreflection of the last relighting."""
         return int(self._core.sweeps)
 
     @property

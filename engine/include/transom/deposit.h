@@ -30,7 +30,7 @@ class DirectLight {
               const std::vector<Material>& materials, float small_opening_m2);
 
   /// Mean direct illuminance of the elements of `slots` that receive any, in the order of `slots`. Stratified over each
-  /// element; elements on an edge of a beam are sampled again sixteen times as densely.
+  /// element; a patch that is partly lit is sampled again eight times as densely.
   std::vector<LitElement> deposit(const std::vector<Beam>& beams, const std::vector<int>& slots,
                                   std::uint32_t seed) const;
 

@@ -46,6 +46,8 @@ struct SolveFacts {
   float maximum_edge_m = 0;
   double leak_share = 0;  ///< of the hemisphere rays of interior patches, those that met nothing
   TransferDefects defects;
+  int cluster_count = 0;       ///< of patches, for interreflection
+  std::size_t link_bytes = 0;  ///< of what is kept of how nodes see patches
 };
 
 /// Flux balance of the interior [lm], linear RGB. Interior: every side that light from the rooms' side of the openings,
@@ -77,10 +79,10 @@ struct Lighting {
   std::vector<BrightElement> bright_elements;      ///< what points are connected to
   std::vector<glm::vec3> patch_sky;                ///< directly from sky and ground [lx]
   std::vector<glm::vec3> patch_sun;                ///< directly from beams and point sources [lx]
-  int sweeps = 0;
-  int shots = 0;              ///< kClassic: patches that have shot
-  double unshot_share = 0;    ///< kClassic: flux in flight, relative
-  int forward_ray_count = 0;  ///< kClassic
+  int sweeps = 0;                                  ///< cycles of interreflection
+  int shots = 0;                                   ///< kClassic: patches that have shot
+  double unshot_share = 0;                         ///< kClassic: flux in flight, relative
+  int forward_ray_count = 0;                       ///< kClassic
 };
 
 class Engine {
@@ -99,9 +101,10 @@ class Engine {
   void begin_relight(Condition condition);
   bool continue_relight(int shots);
 
-  /// Irradiance at points (world coordinates [m]) with unit normals, under the present condition.
+  /// Irradiance at points (world coordinates [m]) with unit normals, under the present condition. What the last points
+  /// see is kept: asked again under another condition, they cost sums and connections to sunlit patches.
   std::vector<Irradiance> illuminance(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
-                                      GatherSamples samples) const;
+                                      GatherSamples samples);
 
   /// Flux balance under the present condition; `rays_per_opening` samples each opening triangle independently.
   EnergyAudit audit(int rays_per_opening) const;
@@ -166,7 +169,7 @@ class Engine {
   std::vector<float> patch_area_;  // exposed part [m²]
   std::vector<glm::vec3> patch_reflectance_, patch_emitted_;
   std::vector<char> is_interior_;
-  std::vector<int> unseen_slots_;  // that see patches indoors and were seen by none
+  std::vector<int> unseen_slots_;   // that see patches indoors and were seen by none
   bool connects_emitters_ = false;  // small emitters: found by connection, not by rays
   SparseRows form_factors_, through_, patch_sky_;
   std::unique_ptr<Interreflection> interreflection_;
@@ -181,6 +184,18 @@ class Engine {
   std::vector<LitElement> lit_by_sources_;
   std::vector<BrightElement> bright_always_;
   std::vector<glm::vec3> node_always_;
+
+  // Points at which illuminance was asked for last.
+  struct Sensors {
+    std::vector<glm::dvec3> points;
+    std::vector<glm::vec3> normals;
+    GatherSamples samples;
+    std::vector<Node> nodes;
+    SparseRows sky, patches;
+  };
+  void gather_sensors(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
+                      GatherSamples samples);
+  Sensors sensors_;
 
   // kClassic alone.
   std::unique_ptr<ForwardRays> forward_rays_;

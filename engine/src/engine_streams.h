@@ -1,0 +1,19 @@
+// Streams of random numbers: each use of the engine has its own.
+#pragma once
+
+#include <cstdint>
+
+namespace transom {
+
+enum Stream : std::uint64_t {
+  kPatchStream = 1,
+  kNodeStream,
+  kBeamStream,
+  kSensorStream,
+  kAuditStream,
+  kSurveyStream,
+  kSourceStream,
+  kUnseenStream = 1u << 20
+};
+
+}  // namespace transom
