@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -18,7 +18,13 @@ from transom.hard.rooms import Polygon, Room, as_point, box, quad, windowed_room
 from transom.scene.model import Scene
 
 FEW = SolveOptions(target_patch_count=100, patch_rays=256, patch_opening_rays=64, node_rays=32, node_opening_rays=32)
-bounded = settings(max_examples=12, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+bounded = settings(
+    max_examples=8,
+    deadline=None,
+    derandomize=True,
+    phases=[Phase.explicit, Phase.generate],
+    suppress_health_check=[HealthCheck.too_slow],
+)
 
 shares = st.floats(0.0, 0.95, allow_nan=False)
 towards_sun = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, -0.1), st.floats(0.1, 1.0))
@@ -70,7 +76,7 @@ def sky_and_sun(scene: Scene, towards: tuple[float, float, float], sky: float = 
 def sensors_lx(engine: Engine, condition: Condition) -> NDArray[np.float64]:
     engine.relight(condition)
     (desk,) = engine.scene.sensors
-    return np.asarray(luminance(engine.illuminance(desk.points, desk.normals, rays=1024, opening_rays=512)["total"]))
+    return np.asarray(luminance(engine.illuminance(desk.points, desk.normals, rays=4096, opening_rays=16384)["total"]))
 
 
 @bounded
@@ -105,7 +111,7 @@ def test_light_is_linear_in_sky_and_sun(
 def test_openings_add_up(room: Room, towards: tuple[float, float, float]) -> None:
     """Each hole filled with black in turn: a hole reflects nothing, so that what stays of the room is the same.
 
-    Openings are sampled anew, with as many rays as before: 512 a point leave less than 2 % of the light of a place.
+    Openings are sampled anew, with as many rays as before: 16,384 a point.
     """
 
     def of(open_ones: set[str]) -> NDArray[np.float64]:
