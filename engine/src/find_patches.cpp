@@ -112,13 +112,13 @@ void Engine::mark_interior(const std::vector<GatherRow>& rows) {
     if (scene_.materials[faces_.faces[mesh_->slot(slot).face].material].opening >= 0 ||
         rows[patch_of_slot_[slot]].escaped == 0)
       mark(patch_of_slot_[slot]);
-  for (const int slot : unseen_slots_) mark(patch_of_slot_[slot]);
-  if (!scene_.point_sources.empty())
-    for (std::size_t p = 0; p < rows.size(); ++p) mark(static_cast<int>(p));
   // What an opening sees is indoors, however small it is itself.
   const auto patch_at = [&](const Share& share) { return patch_of_slot_[share.index / mesh_->elements_per_slot()]; };
   for (const int patch : std::vector<int>(stack))
     for (const Share& share : rows[patch].reached) mark(patch_at(share));
+  for (const int slot : unseen_slots_) mark(patch_of_slot_[slot]);
+  if (!scene_.point_sources.empty())
+    for (std::size_t p = 0; p < rows.size(); ++p) mark(static_cast<int>(p));
   // What a patch indoors sees is indoors if it sees a patch indoors itself. One ray that slips through an edge, between
   // slivers, meets the outside of a wall, which does not look back.
   std::vector<int> pending;
