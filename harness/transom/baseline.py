@@ -85,7 +85,8 @@ class Change(BaseModel):
 
 
 class Blessing(BaseModel):
-    """Who accepted new values, when, for what reason, and what moved."""
+    """Who accepted new values, when, for what reason, and what moved. seeds: so many were measured; refused: those by
+    which the engine would not solve a scene, which is a fault of its own."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -96,6 +97,7 @@ class Blessing(BaseModel):
     engine: str
     processor: str
     seeds: int
+    refused: list[str]
     changes: list[Change]
     values: str
     previous: str
@@ -183,13 +185,16 @@ def read_baseline(path: Path) -> Baseline | None:
 
 
 def bless(
-    path: Path, suite: str, measured: Sequence[Measured], reason: str, engine: str, author: str | None = None
+    path: Path,
+    suite: str,
+    measured: Sequence[Measured],
+    reason: str,
+    engine: str,
+    author: str | None = None,
+    refused: Sequence[str] = (),
 ) -> Baseline:
     """Writes new values with one more entry of history. Raises InputError for a reason that says nothing."""
-    reason = " ".join(reason.split())
-    if len(reason) < LEAST_REASON:
-        remedy = "Say in a sentence why the numbers may move"
-        raise InputError("is no reason", field="--reason", value=reason, remedy=remedy)
+    reason = checked_reason(reason)
     earlier = read_baseline(path)
     cases = [_blessed(case) for case in measured]
     history = list(earlier.history) if earlier is not None else []
@@ -203,6 +208,7 @@ def bless(
             engine=engine,
             processor=machine.processor,
             seeds=max((len(case.by_seed) for case in measured), default=0),
+            refused=list(refused),
             changes=_changes(earlier, measured) if earlier is not None else [],
             values=_values_digest(cases),
             previous=_digest(history[-1].model_dump(mode="json")) if history else "",
@@ -211,6 +217,15 @@ def bless(
     baseline = Baseline(format=BASELINE_FORMAT, suite=suite, history=history, cases=cases)
     write_atomic(path, _text(baseline))
     return baseline
+
+
+def checked_reason(reason: str) -> str:
+    """The reason on one line. Raises InputError for one that says nothing."""
+    words = " ".join(reason.split())
+    if len(words) < LEAST_REASON:
+        remedy = "Say in a sentence why the numbers may move"
+        raise InputError("is no reason", field="--reason", value=reason, remedy=remedy)
+    return words
 
 
 def drifts(blessed: BlessedCase, now: Measured, *, fresh_seed: bool) -> list[Drift]:

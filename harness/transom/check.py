@@ -21,6 +21,7 @@ from transom.baseline import (
     Measured,
     baseline_file,
     bless,
+    checked_reason,
     drifts,
     read_baseline,
     worth_judging,
@@ -32,10 +33,20 @@ from transom.daylight.condition import Condition
 from transom.errors import InputError
 from transom.files import write_atomic
 from transom.judge import Missing, Outcome, ToleranceFile, Verdict, exit_code, judge, read_tolerances
-from transom.measures import Measure, fact_measures, geometry_measures, image_measures, sensor_measures, sun_measures
+from transom.measures import (
+    UP_CLOSE_RAYS,
+    Measure,
+    fact_measures,
+    geometry_measures,
+    image_measures,
+    sensor_measures,
+    sun_measures,
+    triangle_measures,
+    triangle_points,
+)
 from transom.progress import CaseProgress
 from transom.renderer import Float64, ImageResult, Progress, Renderer, SensorResult, load_renderer
-from transom.run import engine_questions
+from transom.run import Question, engine_questions
 from transom.scene import scene_root
 from transom.scene.model import Scene, View
 from transom.sensor_file import SensorTable, scene_sensors
@@ -52,16 +63,23 @@ LIGHT_METHOD = "rays"
 
 @dataclass(frozen=True)
 class Asked:
-    """One case of a suite as it is measured: a view by one visibility method, or all sensors of a scene (view None)."""
+    """One case of a suite as it is measured: a view by one visibility method, or, without a view, all sensors of a
+    scene or (`faces`) all of its triangles from up close."""
 
     entry: SuiteCase
     view: View | None
     method: str
+    faces: bool = False
+
+    @property
+    def place(self) -> str:
+        if self.view is not None:
+            return self.view.name
+        return "faces" if self.faces else "sensors"
 
     @property
     def name(self) -> str:
-        place = self.view.name if self.view is not None else "sensors"
-        return "/".join((self.entry.scene.name, place, self.entry.condition.name, self.method))
+        return "/".join((self.entry.scene.name, self.place, self.entry.condition.name, self.method))
 
 
 @dataclass(frozen=True)
@@ -140,7 +158,10 @@ def check_suite(
     if seed is not None:
         engine = WithOptions(engine, {"seed": seed})
     baseline = read_baseline(baseline_file(name, folder))
-    crashes = render_questions(engine, list(engine_questions(suite, engine, VISIBILITIES)), name)
+    questions = list(engine_questions(suite, engine, VISIBILITIES))
+    questions += [Question(_case(asked, engine)) for asked in asked_cases(suite) if asked.faces]
+    questions.sort(key=_solve)  # what one solve answers stands together
+    crashes = render_questions(engine, questions, name)
     comparison = compare_suite(suite, build, crashes, engine)
     verdicts = judge_compared(name, build)
     tolerances = read_tolerances(scene_root() / "tolerances.toml")
@@ -160,6 +181,10 @@ def check_suite(
     )
 
 
+def _solve(question: Question) -> tuple[str, int]:
+    return question.case.scene.name, -int(question.case.options.get("target_patch_count", 0))
+
+
 def write_check(path: Path, checked: Sequence[Checked]) -> None:
     """check.json: everything that was compared with baselines and decided."""
     write_atomic(path, TypeAdapter(list[Checked]).dump_json(list(checked), indent=1) + b"\n")
@@ -168,23 +193,45 @@ def write_check(path: Path, checked: Sequence[Checked]) -> None:
 def bless_suite(
     name: str, reason: str, *, seeds: int = BLESSED_SEEDS, engine: Renderer | None = None, folder: Path | None = None
 ) -> Baseline:
-    """Measures a suite with several seeds, the default one first, and blesses what was found."""
+    """Measures a suite with several seeds, the default one first, and blesses what was found.
+
+    A seed with which the engine refuses a scene is left out, and named in the history.
+    """
     if seeds < 2:
         raise InputError("are too few to know a spread", field="--seeds", value=seeds, remedy="At least 2")
     suite = load_suite(name)
     engine = engine or load_renderer(ENGINE)
+    path = baseline_file(name, folder)
+    checked_reason(reason)
+    read_baseline(path)
     default = int(engine.default_options()["seed"])
     by_case: dict[str, list[list[Measure]]] = {asked.name: [] for asked in asked_cases(suite)}
+    refused: list[str] = []
     with CaseProgress(seeds, Console(stderr=True)) as bars:
-        for number in range(seeds):
-            bars.begin(f"{name} with seed {default + number}")
-            seeded = WithOptions(engine, {"seed": default + number})
-            for asked in asked_cases(suite):
-                result, facts = _render_now(asked, seeded)
-                by_case[asked.name].append(list(measures_of(asked, result, facts, geometry=number == 0)))
+        for seed in range(default, default + seeds):
+            bars.begin(f"{name} with seed {seed}")
+            try:
+                found = _measures_with(suite, WithOptions(engine, {"seed": seed}), geometry=seed == default)
+            except InputError as error:
+                if seed == default:
+                    raise
+                refused.append(f"seed {seed}: {error}")
+                bars.finish(f"refused: {error}")
+                continue
+            for case, measures in found.items():
+                by_case[case].append(measures)
             bars.finish("measured")
     measured = [_measured(asked, engine, by_case[asked.name]) for asked in asked_cases(suite)]
-    return bless(baseline_file(name, folder), name, measured, reason, _engine_words(suite, engine))
+    return bless(path, name, measured, reason, _engine_words(suite, engine), refused=refused)
+
+
+def _measures_with(suite: Suite, engine: Renderer, *, geometry: bool) -> dict[str, list[Measure]]:
+    """By case, what is measured with one engine, without the stores."""
+    found = {}
+    for asked in asked_cases(suite):
+        result, facts = _render_now(asked, engine)
+        found[asked.name] = list(measures_of(asked, result, facts, geometry=geometry))
+    return found
 
 
 def asked_cases(suite: Suite) -> list[Asked]:
@@ -193,6 +240,7 @@ def asked_cases(suite: Suite) -> list[Asked]:
     for entry in suite.cases:
         if entry.sensors and entry.scene.sensors:
             found.append(Asked(entry, None, LIGHT_METHOD))
+        found.append(Asked(entry, None, LIGHT_METHOD, faces=True))
         found += [Asked(entry, view, method) for view in entry.views for method in VISIBILITIES]
     return found
 
@@ -200,17 +248,17 @@ def asked_cases(suite: Suite) -> list[Asked]:
 def measures_of(
     asked: Asked, result: ImageResult | SensorTable, facts: Mapping[str, Any], *, geometry: bool = True
 ) -> Iterator[Measure]:
-    """The measures of one answer. Solve and geometry are told once a scene: with its sensors, or else its pictures."""
+    """The measures of one answer. Solve and geometry are told once a scene, with its faces."""
     scene = asked.entry.scene
     if isinstance(result, SensorTable):
-        yield from sensor_measures(result)
+        yield from triangle_measures(result) if asked.faces else sensor_measures(result)
     elif asked.view is not None:
         seen = first_surfaces(scene, asked.view)
         if asked.method == LIGHT_METHOD:
             yield from image_measures(scene, asked.view, result, seen)
         else:
             yield from sun_measures(scene, asked.view, luminance(result.components["sun"]).astype(np.float64), seen)
-    if asked.view is None or (not asked.entry.sensors and asked.method == LIGHT_METHOD):
+    if asked.faces:
         yield from fact_measures(facts)
         if geometry:
             yield from geometry_measures(scene)
@@ -223,7 +271,7 @@ def _against_baseline(
     rows: list[Drift] = []
     missing: list[Missing] = []
     for asked in asked_cases(suite):
-        place = (asked.entry.scene.name, asked.view.name if asked.view else "sensors", asked.entry.condition.name)
+        place = (asked.entry.scene.name, asked.place, asked.entry.condition.name)
         blessed = baseline.find(asked.name) if baseline is not None else None
         if blessed is None:
             message = f"no baseline: transom bless {suite.name} --reason ..."
@@ -260,15 +308,20 @@ def _judge_drifts(
 def _case(asked: Asked, engine: Renderer) -> Any:
     scene, condition = asked.entry.scene, asked.entry.condition
     if asked.view is None:
-        return make_case(scene, condition, engine, {}, sensors=_sensors(scene))
+        return make_case(scene, condition, engine, _sensor_options(asked), sensors=_sensors(asked))
     return make_case(scene, condition, engine, {"visibility": asked.method}, view=asked.view)
 
 
-def _sensors(scene: Scene) -> SensorTable:
-    table = scene_sensors(scene)
+def _sensors(asked: Asked) -> SensorTable:
+    scene = asked.entry.scene
+    table = triangle_points(scene) if asked.faces else scene_sensors(scene)
     if table is None:
         raise InputError("has no sensors", file=scene.file)
     return table
+
+
+def _sensor_options(asked: Asked) -> dict[str, Any]:
+    return {"sensor_rays": UP_CLOSE_RAYS, "sensor_opening_rays": UP_CLOSE_RAYS} if asked.faces else {}
 
 
 def _render_now(asked: Asked, engine: Renderer) -> tuple[ImageResult | SensorTable, Mapping[str, Any]]:
@@ -276,8 +329,8 @@ def _render_now(asked: Asked, engine: Renderer) -> tuple[ImageResult | SensorTab
     if asked.view is not None:
         image = engine.render(scene, condition, asked.view, {"visibility": asked.method})
         return image, image.facts
-    table = _sensors(scene)
-    result = engine.illuminance(scene, condition, table.points, table.normals, {})
+    table = _sensors(asked)
+    result = engine.illuminance(scene, condition, table.points, table.normals, _sensor_options(asked))
     return table.measured(np.asarray(luminance(result.illuminance), np.float64), result.standard_error), result.facts
 
 
@@ -291,8 +344,7 @@ def _measured(asked: Asked, engine: Renderer, by_seed: Sequence[Sequence[Measure
         if name in inputs
     }
     entry = asked.entry
-    view = asked.view.name if asked.view is not None else "sensors"
-    return Measured(asked.name, entry.scene.name, view, entry.condition.name, asked.method, words, by_seed)
+    return Measured(asked.name, entry.scene.name, asked.place, entry.condition.name, asked.method, words, by_seed)
 
 
 def _engine_words(suite: Suite, engine: Renderer) -> str:

@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 
 from transom.baseline import Drift
+from transom.measures import UP_CLOSE
 
 LIGHT_CATEGORIES = ("sky", "sky in blocks", "indirect", "indirect in blocks", "emitted", "emitted in blocks", "sun")
 
@@ -19,13 +20,20 @@ UNEVEN_RATIO = 2.0
 FLUX_PERCENT = 0.1
 """An energy balance that is off by more makes or loses flux, beyond the spread of its audit (about 0.03 %)."""
 
+BALANCE_SHARE = 0.2
+"""A transfer that is too strong or weak makes or loses about as much flux as indirect light changes; where the balance
+is off by less than this share of that change, light is not made but put elsewhere."""
+
+LOST_PERCENT, FEW_FACES = 20.0, 0.05
+"""Faces whose light, seen from up close, changed by more, if they are at most this share of all, are lost or hidden."""
+
 NAMED = 4
 """So many places are named, of those that drifted most."""
 
 
 def diagnose(failed: Sequence[Drift], rows: Sequence[Drift]) -> list[str]:
     """Sentences on what drifted, most basic first. failed: drifts that are too large; rows: all that were judged."""
-    found = [*_question(failed), *_geometry(failed), *_shadows(failed)]
+    found = [*_question(failed), *_geometry(failed, rows), *_shadows(failed)]
     sources = [*_level("sun", failed, rows), *_sky(failed, rows)]
     found += sources
     reflected = _interreflection(failed, rows)
@@ -43,10 +51,15 @@ def _question(failed: Sequence[Drift]) -> list[str]:
     return [f"The question changed, not the answer alone: {', '.join(names)}."] if names else []
 
 
-def _geometry(failed: Sequence[Drift]) -> list[str]:
+def _geometry(failed: Sequence[Drift], rows: Sequence[Drift]) -> list[str]:
     counted = [row for row in failed if row.category == "geometry"]
     seen = _largest([row for row in failed if row.category == "geometry seen"])
     found = [f"Geometry: {row.place} {_number(row.before)} → {_number(row.now)} ({row.scene})." for row in counted]
+    near = [row for row in rows if row.category == UP_CLOSE]
+    changed = [row for row in near if not abs(row.difference) <= LOST_PERCENT]
+    if changed and len(changed) <= FEW_FACES * len(near):
+        named = ", ".join(f"{row.place} in {row.scene}" for row in _largest(changed)[:NAMED])
+        found.append(f"Geometry: from up close something else is seen in place of {len(changed)}: {named}.")
     if seen:
         lost = [row for row in seen if not row.now]
         words = "are no longer seen" if lost else "are seen otherwise"
@@ -119,11 +132,15 @@ def _cause(means: Sequence[float], made: float, fewer_sweeps: bool) -> str:
     mixed = bool(means) and min(means) < 0 < max(means)
     if mixed or largest > UNEVEN_RATIO * smallest:
         return "It changed unevenly: reflectance acts at the wrong place of the transfer, or some surface's changed."
+    if abs(made) < BALANCE_SHARE * smallest:
+        return (
+            "The balance all but holds: reflectance acts at the wrong place of the transfer, or reflectances changed."
+        )
     if made > FLUX_PERCENT:
         return "Flux is made: the transfer is too strong (form factors sum to more than 1, or reflectance is too high)."
     if made < -FLUX_PERCENT:
         return "Flux is lost: the transfer is too weak, or the bounces stop early."
-    return "The balance holds: what is reflected changed (reflectances, or the light that reaches them)."
+    return "The balance holds: nodes gather otherwise, or what reaches the surfaces changed."
 
 
 def _of(category: str, rows: Sequence[Drift]) -> list[float]:

@@ -32,6 +32,9 @@ NO_VALUE_INDEX = 255
 
 SCALE_STEPS = 64
 
+CRISP = 'shape-rendering="crispEdges"'
+"""Without it the steps of a scale are drawn with seams between them."""
+
 TONE_TICKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Labels of a toned picture's scale, as shares of its white."""
 
@@ -119,7 +122,7 @@ def _bar_svg(colours: Sequence[str], labels: Sequence[tuple[float, str]], title:
     width, left, bar = 320, 18, 284
     step = bar / len(colours)
     parts = [
-        f'<rect x="{left + index * step:.2f}" y="0" width="{step + 0.3:.2f}" height="9" fill="{colour}"/>'
+        f'<rect x="{left + index * step:.2f}" y="0" width="{step + 0.3:.2f}" height="9" fill="{colour}" {CRISP}/>'
         for index, colour in enumerate(colours)
     ]
     for position, label in labels:

@@ -1,4 +1,4 @@
-"""Figures of speed: error against time, log-log, with error bars on both axes."""
+"""Figures of speed: error against time with error bars on both axes, and time against patches and by phase."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, Literal
 import matplotlib as mpl
 import numpy as np
 
+from transom.bench import Bench, Measurement
 from transom.speed_error import SpeedError
 
 STYLES: dict[str, tuple[str, str]] = {
@@ -19,6 +20,10 @@ STYLES: dict[str, tuple[str, str]] = {
 """Colour and marker by program; colours of Okabe and Ito (2008), told apart with any colour vision."""
 
 OTHER_STYLE = ("#999999", "v")
+_SETTINGS: dict[Any, object] = {"svg.fonttype": "none", "svg.hashsalt": "transom", "font.size": 9}
+LEAST_NAMED_PERCENT = 6.0
+"""Phases with a smaller share have no words in the figure; every one is in the file."""
+
 COVERAGE = 1.959964
 """Error bars are 95 % intervals."""
 
@@ -26,6 +31,46 @@ PHASES: tuple[tuple[Literal["cold", "hour"], str], ...] = (
     ("cold", "From nothing: load, prepare, render"),
     ("hour", "Each further hour"),
 )
+
+
+SCALING: tuple[tuple[str, str, str, str], ...] = (
+    ("solve", "solve", "#0072b2", "o"),
+    ("relight_hour", "relight, a new hour", "#d55e00", "s"),
+    ("frame_rays", "frame, shadow rays", "#009e73", "^"),
+)
+PHASE_COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#e69f00", "#d55e00", "#cc79a7", "#999999", "#f0e442")
+
+
+def scaling_figure(bench: Bench, file_format: Literal["svg", "png"] = "svg") -> bytes:
+    """Left: median time [s] over the number of patches, from fastest to slowest sample. Right: the phases of a solve
+    and of a relighting at default settings, as shares of the phases' sum."""
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(_SETTINGS):
+        figure = Figure(figsize=(9.6, 3.6), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        for quantity, label, colour, marker in SCALING:
+            rows = [row for row in bench.measurements if row.quantity == quantity and row.sweep != "openings"]
+            rows.sort(key=lambda row: row.patches)
+            medians = np.array([row.median for row in rows])
+            bars = [medians - [min(row.samples) for row in rows], [max(row.samples) for row in rows] - medians]
+            patches = [row.patches for row in rows]
+            left.errorbar(patches, medians, yerr=bars, color=colour, marker=marker, linewidth=1.0, label=label)
+        left.set_xscale("log")
+        left.set_yscale("log")
+        left.set_xlabel("patches")
+        left.set_ylabel("time [s]")
+        left.legend(frameon=False)
+        rows = [
+            row for row in bench.measurements if row.sweep == "default" and row.quantity in ("solve", "relight_hour")
+        ]
+        for place, row in enumerate(reversed(rows)):
+            _phase_bar(right, place, row)
+        right.set_yticks(range(len(rows)), [row.quantity.replace("_", " ") for row in reversed(rows)])
+        right.set_xlabel("share of the phases' time [%]")
+        for axes in (left, right):
+            _plain(axes)
+        return _saved(figure, file_format)
 
 
 def speed_error_figure(found: SpeedError, file_format: Literal["svg", "png"] = "svg") -> bytes:
@@ -36,8 +81,7 @@ def speed_error_figure(found: SpeedError, file_format: Literal["svg", "png"] = "
     """
     from matplotlib.figure import Figure
 
-    settings: dict[Any, object] = {"svg.fonttype": "none", "svg.hashsalt": "transom", "font.size": 9}
-    with mpl.rc_context(settings):
+    with mpl.rc_context(_SETTINGS):
         figure = Figure(figsize=(9.6, 4.2), layout="constrained")
         panels = figure.subplots(1, 2, sharey=True)
         for axes, (phase, title) in zip(panels, PHASES, strict=True):
@@ -46,11 +90,7 @@ def speed_error_figure(found: SpeedError, file_format: Literal["svg", "png"] = "
             axes.set_xlabel("time [s]")
         panels[0].set_ylabel("mean relative error of the interior's pixels [%]")
         panels[0].legend(frameon=False, loc="best")
-        stream = io.BytesIO()
-        metadata = {"Date": None} if file_format == "svg" else None
-        figure.savefig(stream, format=file_format, metadata=metadata, dpi=150, transparent=file_format == "svg")
-    content = stream.getvalue()
-    return content[content.index(b"<svg") :] if file_format == "svg" else content
+        return _saved(figure, file_format)
 
 
 def _panel(axes: Any, found: SpeedError, phase: Literal["cold", "hour"]) -> None:
@@ -88,7 +128,32 @@ def _panel(axes: Any, found: SpeedError, phase: Literal["cold", "hour"]) -> None
         axes.plot(times, line, ":", color=STYLES["mitsuba"][0], linewidth=0.8, zorder=0)
         axes.set_xlim(low, high)
         axes.set_ylim(bottom, top)
+    _plain(axes)
+
+
+def _phase_bar(axes: Any, place: int, row: Measurement) -> None:
+    """One stacked bar; phases of phases are in their parent's part."""
+    phases = [phase for phase in row.phases if phase.name.count("/") == 1]
+    total, begin = sum(phase.median for phase in phases) or 1.0, 0.0
+    for phase, colour in zip(phases, PHASE_COLOURS, strict=False):
+        share = 100 * phase.median / total
+        axes.barh(place, share, left=begin, height=0.5, color=colour, edgecolor="white")
+        if share > LEAST_NAMED_PERCENT:
+            words = f"{phase.name.split('/')[1]}\n{1e3 * phase.median:.3g} ms"
+            axes.text(begin + share / 2, place + 0.3, words, ha="center", va="bottom", fontsize=7)
+        begin += share
+
+
+def _plain(axes: Any) -> None:
     axes.grid(which="major", color="#e6e3dc", linewidth=0.7)
     axes.set_axisbelow(True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
+
+
+def _saved(figure: Any, file_format: Literal["svg", "png"]) -> bytes:
+    stream = io.BytesIO()
+    metadata = {"Date": None} if file_format == "svg" else None
+    figure.savefig(stream, format=file_format, metadata=metadata, dpi=150, transparent=file_format == "svg")
+    content = stream.getvalue()
+    return content[content.index(b"<svg") :] if file_format == "svg" else content

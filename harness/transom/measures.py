@@ -40,6 +40,17 @@ PROBE_PIXELS = 96
 LEAST_FACE_PIXELS = 25
 """Faces that all probes together see with fewer pixels are not counted one by one."""
 
+UP_CLOSE = "faces up close"
+"""Category of the light of each triangle, measured so near that nothing else is seen."""
+
+UP_CLOSE_M = 1e-3
+UP_CLOSE_RAYS = 64
+LEAST_TRIANGLE_M2 = 1e-5
+"""Distance from the triangle, rays of each measurement, and the smallest triangle that has one."""
+
+LEAST_LIGHT_SHARE = 0.01
+"""Changes of a triangle's light are stated in percent of it, or of this share of the mean if it is darker."""
+
 FACE_LOSS_SHARE = 0.2
 """That the probes see a face as they did is one claim; so much of its pixels lost or won counts as one broken claim."""
 
@@ -127,6 +138,33 @@ def geometry_measures(scene: Scene) -> Iterator[Measure]:
         yield Measure(
             "broken_claims", "geometry seen", face_words(scene, int(face)), count, 1 / (FACE_LOSS_SHARE * count)
         )
+
+
+def triangle_points(scene: Scene) -> SensorTable:
+    """A point just before the middle of each triangle (two for a quad), looking at it; by face, in order."""
+    mesh = scene.mesh
+    names, points, normals = [], [], []
+    for face, corners in enumerate(mesh.faces):
+        for index, part in enumerate(((0, 1, 2), (0, 2, 3))[: 1 if corners[-1] < 0 or len(corners) == 3 else 2]):
+            a, b, c = (mesh.vertices[corners[k]] for k in part)
+            normal = np.cross(b - a, c - a)
+            length = float(np.linalg.norm(normal))
+            if length / 2 < LEAST_TRIANGLE_M2:
+                continue
+            names.append(f"{face_words(scene, face)}, triangle {index + 1}")
+            points.append((a + b + c) / 3 + UP_CLOSE_M * normal / length)
+            normals.append(-normal / length)
+    return SensorTable(tuple(names), np.array(points), np.array(normals))
+
+
+def triangle_measures(table: SensorTable) -> Iterator[Measure]:
+    """The light of each triangle as it is measured from up close."""
+    values = table.illuminance
+    if values is None:
+        return
+    least = LEAST_LIGHT_SHARE * float(values.mean())
+    for name, value in zip(table.sets, values, strict=True):
+        yield relative(UP_CLOSE, name, float(value), max(float(value), least))
 
 
 def face_words(scene: Scene, face: int) -> str:

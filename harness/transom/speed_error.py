@@ -48,6 +48,9 @@ SCHEMA_FILE = Path(__file__).resolve().parents[2] / "reports" / "speed_error.sch
 
 Phase = Literal["cold", "hour"]
 ENGINE = "engine"
+ENGINE_METHODS: Mapping[str, Literal["gather", "classic"]] = {ENGINE: "gather", "classic": "classic"}
+"""Programs that are the engine, and its method; "classic" is the published one."""
+
 DEFAULT_SETTING = "default"
 FIRST_SEED = 1009
 """Of the programs that draw random numbers; references have seed 1."""
@@ -57,6 +60,8 @@ REFERENCE_WIDTHS = (None, 320, 160)
 
 COLD_REPEATS, HOUR_REPEATS = 3, 5
 QUICK_COLD_REPEATS, QUICK_HOUR_REPEATS = 2, 3
+HOUR_BUDGET_S = 10.0
+"""Further hours end after so many seconds in each process, once there is one: slow programs need not be timed often."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +81,9 @@ SETTINGS: tuple[Setting, ...] = (
     Setting(ENGINE, "half the rays", {"patch_rays": 256, "node_rays": 512, "node_opening_rays": 128}),
     Setting(ENGINE, "wider nodes", {"node_spacing": 12.0}),
     Setting(ENGINE, "10000 patches", {"target_patch_count": 10000}),
+    Setting("classic", "1000 patches", {"target_patch_count": 1000}),
     Setting("classic", DEFAULT_SETTING, {}, True),
+    Setting("classic", "10000 patches", {"target_patch_count": 10000}),
     Setting("mitsuba", "2 paths a pixel", {"samples": 1, "batches": 2}, True),
     Setting("mitsuba", "8 paths a pixel", {"samples": 4, "batches": 2}),
     Setting("mitsuba", "32 paths a pixel", {"samples": 16, "batches": 2}, True),
@@ -186,7 +193,7 @@ def measure_speed_error(
     missing: list[Missing] = []
     for setting in [entry for entry in settings if entry.quick or not quick]:
         progress.begin(f"{setting.program}: {setting.name}")
-        if setting.program not in RENDERERS:
+        if setting.program not in (*RENDERERS, *ENGINE_METHODS):
             missing.append(Missing(setting.program, setting.name, "there is no such renderer here"))
             progress.finish("missing")
             continue
@@ -227,9 +234,9 @@ def make_task(scene: Scene, view: str | None, condition: str | None) -> Task:
 
 def time_program(name: str, task: Task, setting: Setting, seed: int, hours: int) -> Timed:
     """Cold start and further hours of one setting, in this process. Libraries are imported before the clock starts."""
-    renderer = load_renderer(setting.program)
-    if setting.program == ENGINE:
+    if setting.program in ENGINE_METHODS:
         return _time_engine(name, task, setting, hours)
+    renderer = load_renderer(setting.program)
     options = {**renderer.default_options(), **setting.options}
     if "seed" in options:
         options["seed"] = seed
@@ -237,9 +244,9 @@ def time_program(name: str, task: Task, setting: Setting, seed: int, hours: int)
     scene = load_scene(name)
     picture = renderer.render(scene, task.condition, task.view, options)
     cold = time.perf_counter() - begin
-    seconds = []
-    for index in range(hours):
-        light = task.other if index % 2 == 0 else task.condition
+    seconds: list[float] = []
+    while len(seconds) < hours and sum(seconds) < HOUR_BUDGET_S:
+        light = task.condition if len(seconds) % 2 else task.other
         begin = time.perf_counter()
         renderer.render(scene, light, task.view, options)
         seconds.append(time.perf_counter() - begin)
@@ -312,8 +319,9 @@ def _time_engine(name: str, task: Task, setting: Setting, hours: int) -> Timed:
     """The engine's own steps: `EngineRenderer` audits each answer as well, which a user does not wait for."""
     from transom.engine import Engine, SolveOptions
 
+    options = SolveOptions(method=ENGINE_METHODS[setting.program], **setting.options)
     begin = time.perf_counter()
-    engine = Engine.solve(load_scene(name), SolveOptions(**setting.options))
+    engine = Engine.solve(load_scene(name), options)
     engine.relight(task.condition)
     picture = engine.render(task.view).radiance
     cold = time.perf_counter() - begin

@@ -46,7 +46,7 @@ class SuiteEntry(BaseModel):
     description: str = ""
     target_percent: float = Field(default=1.0, gt=0.0)
     width: int | None = Field(default=None, gt=0)
-    reference: Literal["mitsuba", "closed_form", "hard"] = "mitsuba"
+    reference: Literal["mitsuba", "closed_form", "crosscheck", "hard"] = "mitsuba"
     layout: Literal["views", "hours"] = "views"
     report: bool = True
     known: list[str] = []

@@ -2,6 +2,9 @@
 
 A pixel's share of sunlight is its direct luminance against that of the same surface in full sun. Edges are averaged
 over a pixel, so that the share says where in it an edge runs: areas and centroids are known to a small part of a pixel.
+
+Where the picture or furniture in front cuts a patch, those of its edges that the cut makes do not move with the sun:
+its centroid then moves by less than its shadows do.
 """
 
 from __future__ import annotations

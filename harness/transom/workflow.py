@@ -21,6 +21,7 @@ from transom.comparison import (
     read_comparison,
     write_comparison,
 )
+from transom.crosscheck import compare_references, render_references
 from transom.errors import InputError, StorageError
 from transom.failures import error_words, read_failure
 from transom.files import write_atomic
@@ -86,6 +87,8 @@ def render_suite(suite: Suite, *, fresh: bool = False) -> list[Crash]:
     more files does (StorageError)."""
     if suite.reference in DRAWN_IN_CODE:
         return []
+    if suite.reference == "crosscheck":
+        return [Crash(question, message) for question, message in render_references(suite, fresh=fresh)]
     renderer = load_renderer(ENGINE)
     return render_questions(renderer, list(engine_questions(suite, renderer, VISIBILITIES)), suite.name, fresh=fresh)
 
@@ -129,7 +132,7 @@ def compare_finished(name: str, build: Path) -> Comparison:
 
 def stored_failures(suite: Suite) -> list[Crash]:
     """The cases of a suite that failed when they were last rendered, as their failure bundles say."""
-    if suite.reference in DRAWN_IN_CODE:
+    if suite.reference != "mitsuba":
         return []
     questions = engine_questions(suite, load_renderer(ENGINE), VISIBILITIES)
     found = ((question, read_failure(question.case)) for question in questions)
@@ -140,6 +143,8 @@ def compare_suite(suite: Suite, build: Path, crashes: Collection[Crash], engine:
     """Compares every case with its reference and writes comparison.json. engine: another than the engine itself."""
     if suite.reference == "closed_form":
         comparison = compare_known(suite)
+    elif suite.reference == "crosscheck":
+        comparison = compare_references(suite, {crash.question.case.key: crash.message for crash in crashes})
     elif suite.reference == "hard":
         comparison = compare_hard_cases(suite)
     else:

@@ -22,6 +22,7 @@ TOP_LEVEL = {
     ".clang-format",
     ".clang-tidy",
     ".gitattributes",
+    ".github",
     ".gitignore",
     "ARCHITECTURE.md",
     "CHANGELOG.md",

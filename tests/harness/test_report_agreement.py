@@ -53,8 +53,8 @@ class TableReader(HTMLParser):
         values = dict(attrs)
         if tag == "table":
             self._name = values.get("data-table")
-        if tag == "tr" and self._name and "data-source" in values:
-            self.rows.setdefault(self._name, []).append((str(values["data-source"]), []))
+        if tag == "tr" and self._name and "title" in values:
+            self.rows.setdefault(self._name, []).append((str(values["title"]), []))
         if tag == "td" and self._name:
             self.rows[self._name][-1][1].append("")
             self._in_cell = True

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,11 @@ import pytest
 from harness_fakes import grey, small_scene
 
 from transom import speed_error
+from transom.bench import Bench, Measurement, PhaseTimes
 from transom.cli import WRONG_USE, run_command
 from transom.compare import CaseNames
 from transom.errors import InputError
-from transom.figures_speed import speed_error_figure
+from transom.figures_speed import scaling_figure, speed_error_figure
 from transom.provenance import current_provenance
 from transom.renderer import ImageResult
 from transom.speed_error import (
@@ -173,6 +175,19 @@ def test_figure_is_vector_or_pixels_and_names_every_program(monkeypatch: pytest.
     assert text.startswith("<svg")
     assert all(word in text for word in ("engine", "mitsuba", "time [s]", "error"))
     assert speed_error_figure(found, "png").startswith(b"\x89PNG")
+
+
+def test_scaling_figure_has_sizes_and_phases() -> None:
+    def solve(sweep: Any, patches: int, seconds: float) -> Measurement:
+        phases = (PhaseTimes("solve/patches", (seconds,), 0.2 * seconds), PhaseTimes("solve/nodes", (seconds,), 0.8))
+        sizes = (patches, 10, 20, 1, 1, 0, 0, 0)
+        return Measurement("solve", "s", sweep, *sizes, seconds, seconds, seconds, (seconds,), phases)
+
+    rows = (solve("default", 3000, 1.0), solve("patches", 10000, 4.0))
+    bench = Bench(1, datetime.now(UTC), "room", "gcc", 1.0, (0, 0), rows, (), (), (), (), current_provenance())
+    text = scaling_figure(bench).decode()
+    assert all(word in text for word in ("patches", "nodes", "time [s]"))
+    assert scaling_figure(bench, "png").startswith(b"\x89PNG")
 
 
 def test_another_hour_differs_from_the_first() -> None:

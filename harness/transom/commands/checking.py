@@ -84,5 +84,7 @@ def bless(
     for change in entry.changes:
         amount = "came or went" if change.change is None else f"{change.change:+.3g} ({change.quantity})"
         typer.echo(f"{change.case}: {change.category}, {change.place}: {amount}")
+    for refusal in entry.refused:
+        typer.echo(f"The engine refused a scene with {refusal}")
     count = sum(len(case.measures) for case in baseline.cases)
     typer.echo(f"{baseline_file(suite)}: {count} measures of {len(baseline.cases)} cases, {entry.seeds} seeds")

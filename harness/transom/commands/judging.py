@@ -69,17 +69,24 @@ def report(
     rendered: Annotated[
         bool, typer.Option("--rendered", help="Use the runs that are there; render and time nothing.")
     ] = False,
+    publish: Annotated[
+        bool, typer.Option("--publish", help="Also copy it to reports/published, part of the repository.")
+    ] = False,
 ) -> None:
-    """Run every suite, time the engine, and write the report: OUTPUT/index.html and OUTPUT/results.json.
+    """Run every suite, time the engine, and write the report.
 
-    The page is one file, with its pictures in it. Exit code as of `transom judge`, over all suites.
+    Writes OUTPUT/index.html (one file, with its pictures in it), report.pdf, junit.xml, results.json, tables.json and
+    tables/*.csv, all from the same tables. Exit code as of `transom judge`, over all suites.
 
     \b
     Example:  transom report
     """
     from transom.report.build import write_report
+    from transom.report.publish import publish as publish_report
 
     code = write_report(output, build, render=not rendered)
     typer.echo(f"{output / 'index.html'}")
+    if publish:
+        typer.echo(f"reports/published: {len(publish_report(output))} files")
     if code:
         raise typer.Exit(code)

@@ -19,6 +19,9 @@ from transom.sensor_file import SensorTable
 
 Float64 = NDArray[np.float64]
 
+PATHS_PER_PASS, LEAST_LOG2_PATHS = 1 << 15, 8
+"""Of Radiance, over all sensors of a case; and of each sensor at least, as a power of two."""
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -54,12 +57,21 @@ class KnownCase:
 
     def question(self, renderer: Renderer) -> Case:
         """The case as a renderer is asked. Raises InputError for an option that the renderer does not have."""
-        return make_case(self.scene, self.condition, renderer, program_options(renderer), sensors=self.sensors)
+        return make_case(
+            self.scene,
+            self.condition,
+            renderer,
+            program_options(renderer, len(self.sensors.points)),
+            sensors=self.sensors,
+        )
 
 
-def program_options(renderer: Renderer) -> dict[str, object]:
-    """Radiance measures these without a cache of indirect light; the others as they are."""
-    return {"preset": "exact"} if "preset" in renderer.default_options() else {}
+def program_options(renderer: Renderer, sensor_count: int) -> dict[str, object]:
+    """Radiance measures without a cache of indirect light, its paths shared among the sensors: what is known as a sum
+    over many sensors needs fewer of each. The others measure as they are."""
+    if "preset" not in renderer.default_options():
+        return {}
+    return {"preset": "exact", "samples": max(LEAST_LOG2_PATHS, round(math.log2(PATHS_PER_PASS / sensor_count)))}
 
 
 def sensor_table(points: Float64, normals: Float64, name: str = "") -> SensorTable:

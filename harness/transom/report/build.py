@@ -12,7 +12,8 @@ from transom.files import write_atomic
 from transom.judge import Missing, Outcome, ToleranceFile, Verdict, exit_code, judge, read_tolerances
 from transom.report.checks import read_check
 from transom.report.content import Content, Pictures, make_content
-from transom.report.day import day_cases, find_day, render_day
+from transom.report.day import day_cases, find_day, render_missing
+from transom.report.figure_13 import corner_errors, figure_13_cases, figure_13_strips
 from transom.report.junit import junit_xml
 from transom.report.notes import read_notes
 from transom.report.page import write_page
@@ -50,13 +51,14 @@ def write_report(output: Path, build: Path, *, render: bool = True) -> int:
     results = collect_results(judged, timings)
     cases = day_cases([suite for suite in suites if shows_views(suite)])
     if render:
-        render_day(cases, note)
+        render_missing([*figure_13_cases(suites), *cases], note)
     pictures = Pictures(
         rooms=[room for suite in suites if shows_views(suite) for room in rooms(suite)],
         hours=[grid for suite in suites if suite.layout == "hours" for grid in hour_grids(suite, results)],
         factoring=[strip for suite in suites if shows_views(suite) for strip in strips(suite)],
         day=find_day(cases),
-        figure_13=[],
+        figure_13=figure_13_strips(suites),
+        corners=list(corner_errors(suites)),
     )
     speed = read_speed(build, _judged_scenes(suites))
     images, checked = view_images(suites, results), read_check(build / "check" / "check.json")

@@ -49,7 +49,7 @@ def crosschecks(entries: Iterable[Any]) -> Table:
         "Difference [%]",
         "u [%]",
         "Verdict",
-        "Why it is larger",
+        "Note",
     )
     title = "The references against each other"
     return Table("crosscheck", title, head, tuple(rows), "transom run crosscheck")

@@ -162,6 +162,27 @@ def benches(found: Sequence[Bench]) -> Table:
     return Table("bench", "Times against patches and openings", head, tuple(rows), "transom bench SCENE")
 
 
+def machine_limits(found: Sequence[Bench]) -> Table:
+    """Phases against what the machine can do: memory bandwidth for products, rays for visibility."""
+    rows = [
+        Row(
+            (
+                Cell(entry.phase),
+                Cell(entry.counted),
+                Cell(f"{fixed(entry.rate / 1e9, 3)} G{entry.unit}", entry.rate),
+                Cell(words(entry.limit)),
+                number(100 * entry.share, 1),
+            ),
+            bench_source(bench),
+            words(bench.scene),
+        )
+        for bench in found
+        for entry in bench.utilisations
+    ]
+    head = ("Phase", "Counted", "Rate", "Limit of the machine", "Share of it [%]")
+    return Table("machine_limits", "Against the limits of the machine", head, tuple(rows), "transom bench SCENE")
+
+
 def speed_error(found: SpeedError | None) -> Table:
     """Time and error of each program at each setting; what could not be measured, and why."""
     rows = []

@@ -125,7 +125,7 @@ def verdict_list(results: Results) -> Table:
         parts = [part for part in place if part] + ([f"no. {number_in_set.group(1)}"] if number_in_set else [])
         needed = "" if verdict.batches_needed is None else f"{fixed(verdict.batches_needed, 0)} batches"
         cells = (
-            Cell(verdict.outcome, kind="verdict", title=verdict.reason),
+            Cell(verdict.outcome, kind="verdict", title="" if verdict.outcome is Outcome.PASS else verdict.reason),
             Cell(quantity_words(verdict.quantity)),
             Cell(titles[verdict.suite]),
             Cell(words(verdict.scene)),
@@ -146,7 +146,7 @@ def verdict_list(results: Results) -> Table:
         "Scene",
         "Where",
         "Difference",
-        "k u",
+        "k\N{NO-BREAK SPACE}u",
         "b",
         "Tolerance",
         "To decide",
