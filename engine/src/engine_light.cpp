@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <numbers>
 
-#include "engine_streams.h"
+#include "streams.h"
 #include "transom/engine.h"
 #include "transom/parallel.h"
 #include "transom/sampling.h"

@@ -272,6 +272,13 @@ def _check_sensors(points: Float64, normals: Float64, scene: Scene) -> None:
     )
 
 
+@contextmanager
+def thread_limit(count: int) -> Iterator[None]:
+    """A `with` block in which the engine uses at most so many threads; its answers do not depend on them."""
+    with _engine.ThreadLimit(count):
+        yield
+
+
 def build_description() -> str:
     """Compiler, flags and libraries of the compiled engine."""
     return str(_engine.build_description())

@@ -14,7 +14,7 @@ from transom.colour import luminance
 from transom.comparison import compare_methods
 from transom.daylight import resolve_condition
 from transom.daylight.condition import Condition
-from transom.engine import Engine, Frame, SolveOptions, Visibility
+from transom.engine import Engine, Frame, SolveOptions, Visibility, thread_limit
 from transom.errors import InputError
 from transom.hard import changes
 from transom.hard.rooms import Room
@@ -189,11 +189,9 @@ def relit(lit: Lit) -> Claim:
 
 def threads(lit: Lit) -> Claim:
     def check() -> Seen:
-        from transom._engine import ThreadLimit
-
         answers = []
         for count in (1, 3):
-            with ThreadLimit(count):
+            with thread_limit(count):
                 fresh = Lit(lambda: lit.scene, lambda _: lit.condition, lit.options)
                 answers.append((fresh.sensors["total"], fresh.picture().radiance))
         is_same = all(np.array_equal(one, other) for one, other in zip(*answers, strict=True))

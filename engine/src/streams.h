@@ -1,4 +1,4 @@
-// Streams of random numbers: each use of the engine has its own.
+/// @file Streams of random numbers: each use of them has its own.
 #pragma once
 
 #include <cstdint>
