@@ -58,6 +58,9 @@ CACHED_PARAMETERS, PATH_PARAMETERS = "-u-", "-u+"
 it makes paths 1 % too bright (an empty box of three tones: 1442 +- 1.2 lx instead of 1422.0); uncorrelated sampling is
 right (1421.5 +- 1.5). rtrace seeds it by the clock: paths repeat within their standard error, not bit by bit."""
 
+LIGHT_SAMPLES = 64
+"""Points of the sun's disc and of point sources that a sensor looks at in one pass."""
+
 OVERTURE_STEP = 4
 """Every so many-th pixel across and down fills the irradiance cache before the picture is traced."""
 
@@ -316,8 +319,8 @@ def _traced(
 def _from_lights(octree: Path, arguments: list[str], points: Float64, normals: Float64, passes: int) -> Float64:
     """Irradiance (passes, N, 3) straight from the sun and point sources; passes differ where the sun is a disc."""
     places = np.hstack([points, normals])
-    found = trace(octree, arguments, np.tile(places, (passes, 1)), irradiance=True)
-    return found.astype(np.float64).reshape(passes, len(points), 3)
+    found = trace(octree, arguments, np.tile(places, (passes * LIGHT_SAMPLES, 1)), irradiance=True)
+    return found.astype(np.float64).reshape(passes, LIGHT_SAMPLES, len(points), 3).mean(axis=1)
 
 
 def _cosine_directions(normal: Float64, count: int, generator: np.random.Generator) -> Float64:
