@@ -200,7 +200,8 @@ void Engine::light_always() {
   if (bright_always_.empty()) return;
   const FirstBounce first_bounce(*mesh_, *rays_, bright_always_);
   parallel_indices(nodes.size(), kGrain, [&](std::size_t i) {
-    if (nodes_->is_exposed(i)) node_always_[i] = first_bounce.irradiance(nodes[i].position, nodes[i].normal);
+    if (nodes_->is_exposed(i))
+      node_always_[i] = first_bounce.irradiance(nodes[i].position, nodes[i].normal, FirstBounce::Rays::kOne);
   });
 }
 

@@ -138,8 +138,8 @@ std::vector<Irradiance> Engine::illuminance(const std::vector<glm::dvec3>& point
     const Node& node = sensors_.nodes[i];
     result[i].direct = direct_light_->illuminance(lighting_.condition.beams, node.position, node.normal);
     result[i].sky = sky_light(sensors_.sky, i);
-    result[i].indirect =
-        first_bounce.irradiance(node.position, node.normal) + sensors_.patches.dot(i, lighting_.patch_smooth_radiosity);
+    result[i].indirect = first_bounce.irradiance(node.position, node.normal, FirstBounce::Rays::kMany) +
+                         sensors_.patches.dot(i, lighting_.patch_smooth_radiosity);
   });
   return result;
 }

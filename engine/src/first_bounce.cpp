@@ -1,5 +1,6 @@
 #include "transom/first_bounce.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -10,12 +11,28 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kFar = 4;  // diameters from which a patch counts as a point: then it errs by about 1 % of its share
-constexpr float kAdjacent = 3;  // diameters below which an element needs its closed form
+constexpr float kAdjacent = 3;         // diameters below which an element needs its closed form
+constexpr float kRaysPerShare = 2000;  // rays to an element for each 1 of form factor
+constexpr int kMostRays = 64;          // to one element
 
 struct Connection {
   Ray ray;
   glm::vec3 irradiance;
 };
+
+// Lifted point of an element, the i-th of a sequence that fills it evenly [Roberts 2018, the R2 sequence].
+glm::vec3 point_of(const ElementShape& shape, int i) {
+  const float u = std::fmod(0.5f + 0.7548776662f * static_cast<float>(i), 1.f),
+              v = std::fmod(0.5f + 0.5698402910f * static_cast<float>(i), 1.f);
+  const glm::vec3* c = shape.corner;
+  if (shape.corner_count == 4) {
+    const glm::vec3 lift = shape.middle - 0.25f * (c[0] + c[1] + c[2] + c[3]);
+    return (1 - u) * (1 - v) * c[0] + u * (1 - v) * c[1] + u * v * c[2] + (1 - u) * v * c[3] + lift;
+  }
+  const glm::vec2 b = u + v > 1 ? glm::vec2(1 - u, 1 - v) : glm::vec2(u, v);
+  const glm::vec3 lift = shape.middle - (c[0] + c[1] + c[2]) / 3.f;
+  return c[0] + b.x * (c[1] - c[0]) + b.y * (c[2] - c[0]) + lift;
+}
 
 }  // namespace
 
@@ -76,7 +93,7 @@ void FirstBounce::add(const BrightElement& bright) {
   patch.flux += shape.area * bright.radiosity;
 }
 
-glm::vec3 FirstBounce::irradiance(glm::vec3 point, glm::vec3 normal) const {
+glm::vec3 FirstBounce::irradiance(glm::vec3 point, glm::vec3 normal, Rays precision) const {
   thread_local std::vector<Connection> connections;
   thread_local std::vector<Ray> rays;
   thread_local std::vector<std::uint8_t> blocked;
@@ -90,7 +107,7 @@ glm::vec3 FirstBounce::irradiance(glm::vec3 point, glm::vec3 normal) const {
     const float height = -glm::dot(to_patch, patch.normal);
     if (height <= 0) continue;  // all of a planar patch is seen from behind
     const float distance2 = glm::dot(to_patch, to_patch);
-    if (distance2 > kFar * kFar * patch.size * patch.size) {
+    if (precision == Rays::kOne && distance2 > kFar * kFar * patch.size * patch.size) {
       const float cosine = glm::dot(to_patch, normal);
       if (cosine > 0) connect(patch.centroid, patch.flux * (cosine * height / (kPi * distance2 * distance2)));
       continue;
@@ -98,7 +115,13 @@ glm::vec3 FirstBounce::irradiance(glm::vec3 point, glm::vec3 normal) const {
     for (std::size_t k = patch.first_element; k < patch.last_element; ++k) {
       const LitPiece& piece = pieces_[k];
       const float share = element_share(point, normal, piece.shape, patch.normal);
-      if (share > 0) connect(piece.shape.middle, piece.radiosity * share);
+      if (share <= 0) continue;
+      const int count =
+          precision == Rays::kOne ? 1 : std::clamp(static_cast<int>(std::ceil(kRaysPerShare * share)), 1, kMostRays);
+      // Another part of the sequence for each element, so that neighbours do not repeat each other.
+      const int first = count == 1 && precision == Rays::kMany ? static_cast<int>(k) : 0;
+      for (int i = 0; i < count; ++i)
+        connect(point_of(piece.shape, first + i), piece.radiosity * (share / static_cast<float>(count)));
     }
   }
   if (connections.empty()) return glm::vec3(0);

@@ -320,7 +320,8 @@ def _from_lights(octree: Path, arguments: list[str], points: Float64, normals: F
     """Irradiance (passes, N, 3) straight from the sun and point sources; passes differ where the sun is a disc."""
     places = np.hstack([points, normals])
     found = trace(octree, arguments, np.tile(places, (passes * LIGHT_SAMPLES, 1)), irradiance=True)
-    return found.astype(np.float64).reshape(passes, LIGHT_SAMPLES, len(points), 3).mean(axis=1)
+    by_pass = found.astype(np.float64).reshape(passes, LIGHT_SAMPLES, len(points), 3)
+    return np.asarray(by_pass.mean(axis=1))
 
 
 def _cosine_directions(normal: Float64, count: int, generator: np.random.Generator) -> Float64:

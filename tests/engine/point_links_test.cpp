@@ -54,7 +54,8 @@ TEST(PointLinks, AgreeWithConnectionsWhereNothingStandsBetween) {
   const FirstBounce connections(*floor.mesh, *floor.rays, floor.bright);
   const std::vector<glm::vec3> linked = floor.by_links(links);
   for (std::size_t i = 0; i < floor.points.size(); ++i) {
-    const glm::vec3 expected = connections.irradiance(floor.points[i].position, floor.points[i].normal);
+    const glm::vec3 expected =
+        connections.irradiance(floor.points[i].position, floor.points[i].normal, FirstBounce::Rays::kOne);
     EXPECT_NEAR(linked[i].x, expected.x, 2e-3f * expected.x + 1e-3f) << i;
     EXPECT_NEAR(linked[i].z, expected.z, 2e-3f * expected.z + 1e-3f) << i;
   }

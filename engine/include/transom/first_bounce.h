@@ -35,9 +35,13 @@ class FirstBounce {
   /// Elements of one slot stand together.
   FirstBounce(const LightMesh& mesh, const RayScene& rays, const std::vector<BrightElement>& bright);
 
-  /// Irradiance at a lifted point [lx]. A far patch counts as a point at the centroid of its light, a near one element
-  /// by element, an adjacent element by its closed form; each with one ray for what stands between.
-  glm::vec3 irradiance(glm::vec3 point, glm::vec3 normal) const;
+  /// How well it is known what stands between. kOne: a far patch counts as a point at the centroid of its light, a near
+  /// one element by element; each with one ray. kMany: always element by element, the more rays all over an element the
+  /// more light it sends, so that what is partly hidden by an edge is partly seen.
+  enum class Rays { kOne, kMany };
+
+  /// Irradiance at a lifted point [lx]; an adjacent element by its closed form.
+  glm::vec3 irradiance(glm::vec3 point, glm::vec3 normal, Rays rays) const;
 
  private:
   struct LitPatch {
