@@ -23,7 +23,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from transom.errors import InputError
 from transom.files import write_atomic
 from transom.judge import GOOD_ENOUGH_SHARE, Subject, ToleranceFile, coverage_factor
-from transom.measures import Measure
+from transom.measures import UP_CLOSE, Measure
 from transom.provenance import current_provenance
 from transom.suite import invalid_field
 
@@ -247,6 +247,8 @@ def drifts(blessed: BlessedCase, now: Measured, *, fresh_seed: bool) -> list[Dri
         if before is None or after is None:
             found = (before.value if before else None, after.value if after else None)
             rows.append(Drift(*place, *name, *found, math.nan, 0.0, 0, None))
+        elif fresh_seed and before.category == UP_CLOSE and before.spread == 0:
+            continue  # a buried face, dark by every blessed seed: one of its few rays by chance would light it
         elif fresh_seed:
             rows.append(_drift_of_mean(place, before, after, blessed.seeds))
         else:

@@ -14,7 +14,7 @@ from transom.baseline import Baseline, Drift, Measured, bless, drifts, read_base
 from transom.diagnosis import diagnose
 from transom.errors import InputError
 from transom.judge import Outcome, judge, read_tolerances
-from transom.measures import Measure, relative
+from transom.measures import UP_CLOSE, Measure, relative
 
 TOLERANCES = Path(__file__).parents[2] / "scenes" / "tolerances.toml"
 REASON = "a test that says why"
@@ -150,3 +150,11 @@ def test_changed_input_and_measures_that_come_or_go_fail_by_name(tmp_path: Path)
 def test_drifts_are_told_by_what_they_point_to(tmp_path: Path, now: dict[str, float], words: str) -> None:
     rows = compared(blessed(tmp_path), measures(1, 0.0, **now))
     assert words in " ".join(diagnose(failed(rows), rows))
+
+
+def test_buried_faces_are_told_by_the_blessed_seed_alone(tmp_path: Path) -> None:
+    """Dark by every blessed seed, lit by a ray of another by chance: no drift; by the same seed it is one."""
+    dark, lit = (relative(UP_CLOSE, "leg", value, 16.0) for value in (0.0, 1.5))
+    baseline = blessed(tmp_path, [dark], [dark])
+    assert compared(baseline, [lit], fresh_seed=True) == []
+    assert len(failed(compared(baseline, [lit]))) == 1
