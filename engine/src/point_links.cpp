@@ -12,7 +12,7 @@ namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kFar = 4;  // diameters from which a patch counts as a point: then it errs by about 1 % of its share
 constexpr std::size_t kMemory = 512u << 20;  // for links [bytes]
-constexpr float kLeastDistance2 = 1e-20f;    // keeps 0 / 0 out of weights that are multiplied by 0
+constexpr float kLeastDistance2 = 1e-15f;    // keeps 0 / 0 out of weights that are 0; its square is a normal number
 constexpr std::size_t kBlocksAtOnce = 8;
 
 // Shares of light that arrive at the end of segments: 0 behind something opaque, else the transmittance on the way.

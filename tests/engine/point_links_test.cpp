@@ -48,6 +48,17 @@ struct LitFloor {
   }
 };
 
+TEST(PointLinks, APointWithinTheLightOfAPatchStaysFinite) {
+  LitFloor floor;
+  // The very centroid of the light of the first patch, beside points that see it from afar.
+  glm::vec3 centroid(0);
+  const int count = floor.mesh->elements_per_slot();
+  for (int e = 0; e < count; ++e) centroid += element_shape(*floor.mesh, floor.bright[e].element).middle;
+  floor.points[0] = {centroid / static_cast<float>(count), {0, 0, 1}};
+  PointLinks links(*floor.mesh, *floor.rays, floor.points);
+  for (const glm::vec3& e : floor.by_links(links)) EXPECT_TRUE(std::isfinite(e.x + e.y + e.z));
+}
+
 TEST(PointLinks, AgreeWithConnectionsWhereNothingStandsBetween) {
   LitFloor floor;
   PointLinks links(*floor.mesh, *floor.rays, floor.points);
