@@ -23,6 +23,9 @@ TEMPLATE = Path(__file__).resolve().parents[3] / "reports" / "templates" / "repo
 
 JPEG_QUALITY = 92
 
+MOST_ROWS = 160
+"""Rows of one table that are printed; longer ones are for reading by machines, and are whole in the other formats."""
+
 NOT_PRINTED = ("verdicts", "matrix")
 """Printed by sections of their own: the matrix in colours, and of the list of verdicts what did not pass."""
 
@@ -111,10 +114,13 @@ def _table(table: Table) -> dict[str, Any]:
             "source": row.source,
             "cells": [{"text": cell.text, "kind": cell.kind, "number": cell.value is not None} for cell in row.cells],
         }
-        for row in table.rows
+        for row in table.rows[:MOST_ROWS]
     ]
     head = list(table.head)
-    return {"name": table.name, "title": table.title, "head": head, "rows": rows, "command": table.command}
+    title = table.title
+    if len(table.rows) > MOST_ROWS:
+        title += f" (the first {MOST_ROWS} of {len(table.rows)}; all are in tables/{table.name}.csv)"
+    return {"name": table.name, "title": title, "head": head, "rows": rows, "command": table.command}
 
 
 def _open(verdicts: Table) -> Table:

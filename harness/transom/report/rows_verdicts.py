@@ -212,16 +212,22 @@ def debt(tolerances: ToleranceFile) -> Table:
     return Table("tolerance_debt", "Tolerance debt", head, tuple(rows), "")
 
 
+BASELINE_ROWS = 60
+"""Measures that a report lists against the baseline when all pass."""
+
+
 def baseline(checked: Sequence[Checked]) -> Table:
-    """Each measure against its blessed value, what did not pass first. Without reference noise, so that drift shows."""
+    """Measures against their blessed values, what did not pass first, then those that moved most. Without reference
+    noise, so that drift shows. check.json holds all."""
     found = [
         (drift, verdict, suite)
         for suite in checked
         for drift, verdict in zip(suite.drifts, suite.baseline_verdicts, strict=False)
     ]
     found.sort(key=lambda entry: (WORST_FIRST.index(entry[1].outcome), -abs(entry[0].difference)))
+    count = max(BASELINE_ROWS, sum(verdict.outcome != Outcome.PASS for _, verdict, _ in found))
     rows = []
-    for drift, verdict, suite in found:
+    for drift, verdict, suite in found[:count]:
         cells = (
             Cell(verdict.outcome, kind="verdict"),
             Cell(drift.case),
@@ -235,7 +241,8 @@ def baseline(checked: Sequence[Checked]) -> Table:
         source = f"{suite.suite}, {suite.blessed}, seed {suite.seed or 'default'}"
         rows.append(Row(cells, source))
     head = ("Verdict", "Case", "Measure", "Blessed", "Now", "Difference [%]", "u [%]", "Tolerance [%]")
-    return Table("baseline", "Against the blessed baseline", head, tuple(rows), "transom check")
+    of_all = f": {count} of {len(found)} measures, worst first" if len(found) > count else ""
+    return Table("baseline", f"Against the blessed baseline{of_all}", head, tuple(rows), "transom check")
 
 
 def _significant(value: float | None) -> Cell:
