@@ -12,6 +12,7 @@ from transom.errors import InputError
 from transom.hard.camera_cases import camera_cases
 from transom.hard.claims import Case, Claim, Seen
 from transom.hard.limit_cases import limit_cases
+from transom.hard.rooms import without_folder
 from transom.hard.shape_cases import shape_cases
 from transom.hard.sun_cases import sun_cases
 from transom.hard.table_cases import table_cases
@@ -59,4 +60,5 @@ def try_claim(case: Case, claim: Claim) -> HardCase:
     except Exception as error:
         seen = Seen(False, f"{type(error).__name__}: {' '.join(str(error).split())}")
     seconds = round(time.perf_counter() - started, 3)
-    return HardCase(case.name, case.group, claim.name, claim.expectation, seen.holds, seen.text, seconds)
+    text = without_folder(seen.text)
+    return HardCase(case.name, case.group, claim.name, claim.expectation, seen.holds, text, seconds)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -25,6 +26,14 @@ WINDOW_M = (1.0, 1.0, 3.0, 2.5)
 
 SENSORS_M = ((2.0, 1.0, 0.8), (2.0, 2.5, 0.8), (1.0, 4.0, 0.8), (3.5, 4.5, 0.8))
 """Where illuminance is measured in the usual room, looking up."""
+
+
+FOLDER_PREFIX = "hard_"
+
+
+def without_folder(text: str) -> str:
+    """A message without the temporary folder in which a room was written for the loader."""
+    return re.sub(re.escape(tempfile.gettempdir()) + rf"/{FOLDER_PREFIX}\w+(/|\b)", "", text)
 
 
 @dataclass(frozen=True)
@@ -63,7 +72,7 @@ class Room:
 
     def load(self) -> Scene:
         """The scene as the loader sees it. Raises its InputError."""
-        with tempfile.TemporaryDirectory(prefix="hard_") as folder:
+        with tempfile.TemporaryDirectory(prefix=FOLDER_PREFIX) as folder:
             (Path(folder) / "mesh.obj").write_text(self.obj(), encoding="utf-8")
             (Path(folder) / "scene.toml").write_text(self.toml(), encoding="utf-8")
             return load_scene(Path(folder))
