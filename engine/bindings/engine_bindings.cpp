@@ -5,6 +5,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include "section_bindings.h"
 #include "transom/build.h"
 #include "transom/engine.h"
 #include "transom/error.h"
@@ -52,6 +53,7 @@ NB_MODULE(_engine, m) {
   m.doc() = "Transom's light transport engine.";
   nb::exception<InputError>(m, "EngineInputError", PyExc_ValueError);
   nb::exception<GlError>(m, "GlError", PyExc_RuntimeError);
+  bind_section(m);
 
   m.def(
       "gl_backend", [] { return GlContext().name(); }, "Name of the OpenGL context that volumes would use.");

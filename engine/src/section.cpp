@@ -112,7 +112,7 @@ class Tracer {
     while (!branches_.empty()) {
       Branch branch = branches_.back();
       branches_.pop_back();
-      if (branch.light.i < options_.least_share || branch.events > options_.maximum_events)
+      if (branch.events > options_.maximum_events)
         light.unfinished += branch.light.i;
       else
         follow(branch, light);
@@ -121,7 +121,12 @@ class Tracer {
 
  private:
   void follow(Branch& branch, SectionLight& light);
+  struct Way {
+    glm::dvec3 direction;
+    Stokes light;
+  };
   void meet(const Branch& branch, const Line& line, SectionLight& light);
+  void divide(const Branch& branch, glm::dvec3 reference, const Way& a, const Way& b);
   void scatter(const Branch& branch, glm::dvec3 normal, double flux);
   void push(const Branch& from, glm::dvec3 direction, glm::dvec3 reference, const Stokes& light) {
     if (light.i > 0)
@@ -235,25 +240,24 @@ void Tracer::meet(const Branch& branch, const Line& line, SectionLight& light) {
       const double n2 = section_.media[static_cast<std::size_t>(is_left ? line.right : line.left)].index;
       const bool is_gap = line.kind == LineKind::kGap;
       const Fresnel f = is_gap ? thin_gap(n1, cosine) : fresnel(n1, n2, cosine);
-      push(branch, mirrored, s, f.reflected * incident);
-      if (f.is_total) break;
       const double ratio = n1 / n2;
-      const glm::dvec3 refracted =
-          is_gap ? branch.direction
-                 : glm::normalize(ratio * branch.direction + (ratio * cosine - f.cosine_beyond) * normal);
-      push(branch, refracted, s, f.transmitted * incident);
+      const glm::dvec3 passed =
+          is_gap || f.is_total ? branch.direction
+                               : glm::normalize(ratio * branch.direction + (ratio * cosine - f.cosine_beyond) * normal);
+      divide(branch, s, {mirrored, f.reflected * incident}, {passed, f.transmitted * incident});
       break;
     }
     case LineKind::kMirror:
     case LineKind::kDiffuse: {
       const double open = line.openness, closed = 1 - open;
       const double rho = closed * (is_left ? line.reflectance : line.reflectance_right);
-      push(branch, branch.direction, s, Mueller{open, open, open, 0} * incident);
+      const Way through{branch.direction, Mueller{open, open, open, 0} * incident};
       double used = open + rho;
       if (line.kind == LineKind::kMirror) {
-        push(branch, mirrored, s, Mueller{rho, rho, -rho, 0} * incident);
+        divide(branch, s, through, {mirrored, Mueller{rho, rho, -rho, 0} * incident});
       } else {
         const double tau = closed * line.transmittance;
+        push(branch, through.direction, s, through.light);
         scatter(branch, normal, rho * incident.i);
         scatter(branch, -normal, tau * incident.i);
         used += tau;
@@ -262,6 +266,20 @@ void Tracer::meet(const Branch& branch, const Line& line, SectionLight& light) {
       break;
     }
   }
+}
+
+// Both ways, or one of them by chance with the flux of both.
+void Tracer::divide(const Branch& branch, glm::dvec3 reference, const Way& a, const Way& b) {
+  const double sum = a.light.i + b.light.i;
+  if (branch.light.i >= options_.split_share || a.light.i <= 0 || b.light.i <= 0) {
+    push(branch, a.direction, reference, a.light);
+    push(branch, b.direction, reference, b.light);
+    return;
+  }
+  const bool takes_a = hash_seed(next_stream(branch), 0) / 4294967296.0 * sum < a.light.i;
+  const Way& way = takes_a ? a : b;
+  const double scale = sum / way.light.i;
+  push(branch, way.direction, reference, Mueller{scale, scale, scale, 0} * way.light);
 }
 
 void Tracer::scatter(const Branch& branch, glm::dvec3 normal, double flux) {
