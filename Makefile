@@ -30,6 +30,10 @@ test: setup ## layout, types and tests, but the slow ones: about ten minutes
 test-all: setup ## everything that `make test` does, and slow tests, clang-tidy, sanitizers, the wheel: about an hour
 	@tools/check.sh all
 
+.PHONY: check
+check: setup ## has accuracy changed? the quick suite against references and our own baseline: some minutes
+	@$(transom) check
+
 .PHONY: references
 references: setup ## render the references that `make report` needs into reference/store: hours; resumes when stopped
 	$(transom) run references

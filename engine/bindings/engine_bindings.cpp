@@ -5,7 +5,11 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <oneapi/tbb/global_control.h>
 #include "section_bindings.h"
+
+#include <memory>
+
 #include "transom/build.h"
 #include "transom/engine.h"
 #include "transom/error.h"
@@ -47,6 +51,13 @@ struct Session {
       : engine(std::move(scene), bins, options), renderer(engine) {}
 };
 
+// At most so many threads while a `with` block lasts.
+struct ThreadLimit {
+  explicit ThreadLimit(int threads) : count(threads) {}
+  int count;
+  std::unique_ptr<oneapi::tbb::global_control> control;
+};
+
 }  // namespace
 
 NB_MODULE(_engine, m) {
@@ -60,6 +71,17 @@ NB_MODULE(_engine, m) {
   m.def(
       "build_description", [] { return std::string(build_description()); },
       "Compiler, flags and libraries of this build.");
+
+  nb::class_<ThreadLimit>(m, "ThreadLimit", "A `with` block in which the engine uses at most `count` threads.")
+      .def(nb::init<int>(), "count"_a)
+      .def("__enter__",
+           [](ThreadLimit& limit) {
+             limit.control = std::make_unique<oneapi::tbb::global_control>(
+                 oneapi::tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(limit.count));
+           })
+      .def(
+          "__exit__", [](ThreadLimit& limit, nb::object, nb::object, nb::object) { limit.control.reset(); },
+          "kind"_a.none(), "error"_a.none(), "trace"_a.none());
 
   nb::class_<OpeningGroup>(m, "OpeningGroup")
       .def(nb::init<>())
@@ -146,7 +168,9 @@ NB_MODULE(_engine, m) {
       .def_ro("node_count", &SolveFacts::node_count)
       .def_ro("maximum_edge_m", &SolveFacts::maximum_edge_m)
       .def_ro("leak_share", &SolveFacts::leak_share)
-      .def_ro("defects", &SolveFacts::defects);
+      .def_ro("defects", &SolveFacts::defects)
+      .def_ro("cluster_count", &SolveFacts::cluster_count)
+      .def_ro("link_bytes", &SolveFacts::link_bytes);
 
   nb::class_<Condition>(m, "Condition")
       .def(
@@ -212,27 +236,28 @@ NB_MODULE(_engine, m) {
           nb::call_guard<nb::gil_scoped_release>(), "Shoots at most so often; whether more is to come.")
       .def(
           "render",
-          [](Session& s, const View& view, Visibility visibility, int edge_samples) {
+          [](Session& s, const View& view, Visibility visibility, int edge_samples, bool components) {
             Frame frame;
             {
               const nb::gil_scoped_release release;
-              frame = s.renderer.render(view, {visibility, edge_samples});
+              frame = s.renderer.render(view, {visibility, edge_samples, components});
             }
             nb::dict result;
             const int w = frame.width, h = frame.height;
             result["radiance"] = picture(std::move(frame.radiance), w, h);
+            result["edge_pixel_count"] = frame.edge_pixel_count;
+            if (!components) return result;
             result["sun"] = picture(std::move(frame.sun), w, h);
             result["sky"] = picture(std::move(frame.sky), w, h);
             result["indirect"] = picture(std::move(frame.indirect), w, h);
             result["emitted"] = picture(std::move(frame.emitted), w, h);
             result["exterior"] = picture(std::move(frame.exterior), w, h);
-            result["edge_pixel_count"] = frame.edge_pixel_count;
             return result;
           },
-          "view"_a, "visibility"_a, "edge_samples"_a)
+          "view"_a, "visibility"_a, "edge_samples"_a, "components"_a)
       .def(
           "illuminance",
-          [](const Session& s, In<double, nb::shape<-1, 3>> points, In<float, nb::shape<-1, 3>> normals,
+          [](Session& s, In<double, nb::shape<-1, 3>> points, In<float, nb::shape<-1, 3>> normals,
              GatherSamples samples) {
             std::vector<Irradiance> e;
             {

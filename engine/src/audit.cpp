@@ -17,7 +17,14 @@ constexpr std::uint32_t kAuditSeed = 0x5eed0a0d;
 EnergyAudit Engine::audit(int rays_per_opening) const {
   EnergyAudit audit;
   const Condition& condition = lighting_.condition;
-  const int ground = sky_index_->count() - 1;
+  const int ground = sky_index_->count() - 1, per_slot = mesh_->elements_per_slot();
+  const std::vector<glm::vec3> element_light = element_direct();
+  const auto element_radiosity = [&](int element) {
+    const int patch = patch_of_slot_[element / per_slot];
+    if (patch < 0) return glm::vec3(0);
+    return lighting_.patch_smooth_radiosity[patch] + (connects_emitters_ ? patch_emitted_[patch] : glm::vec3(0)) +
+           patch_reflectance_[patch] * element_light[patch * per_slot + element % per_slot];
+  };
   std::vector<Ray> rays(static_cast<std::size_t>(rays_per_opening));
   std::vector<Hit> hits(rays.size());
   std::vector<std::uint8_t> blocked(rays.size());

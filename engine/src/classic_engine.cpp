@@ -16,7 +16,6 @@ void Engine::solve_classic() {
                                                 hash_seed(options_.seed, kForwardStream));
   shooting_ =
       std::make_unique<ProgressiveRadiosity>(form_factors_, through_, patch_area_, patch_reflectance_, patch_emitted_);
-  first_bounce_ = std::make_unique<FirstBounce>(*mesh_, *rays_, std::vector<BrightElement>{});
   connects_emitters_ = false;
 }
 
@@ -77,7 +76,6 @@ void Engine::show_classic() {
   const std::size_t n = slot_of_patch_.size();
   lighting_.unshot_share = shooting_->unshot_share();
   lighting_.patch_irradiance = shooting_->irradiance();
-  lighting_.element_direct.assign(n * static_cast<std::size_t>(mesh_->elements_per_slot()), glm::vec3(0));
   lighting_.patch_smooth_radiosity.resize(n);
   for (std::size_t p = 0; p < n; ++p)
     lighting_.patch_smooth_radiosity[p] = patch_emitted_[p] + patch_reflectance_[p] * lighting_.patch_irradiance[p];

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
-#include <sstream>
 
-#include "transom/error.h"
+#include "streams.h"
+#include "transom/overlap.h"
 #include "transom/parallel.h"
 #include "transom/sampling.h"
 #include "transom/survey.h"
@@ -16,23 +16,9 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr std::size_t kGrain = 8;
-constexpr int kMaximumSweeps = 20000;
-constexpr int kShotsAtOnce = 1 << 20;
-constexpr double kLeakTolerance = 2e-4;    // share of interior rays that may slip through the rounding of edges
 constexpr double kConnectedShare = 0.05;   // emitters up to this share of the interior's area are connected, not hit
 constexpr float kLeastDividedSize = 0.5f;  // of the longest edge of patches: smaller cells are fine enough as they are
 constexpr float kExposedNode = 0.5f;       // a node counts when at least this share of its rays is outside solids
-
-// Streams of random numbers: each use has its own.
-enum Stream : std::uint64_t {
-  kPatchStream = 1,
-  kNodeStream,
-  kBeamStream,
-  kSensorStream,
-  kAuditStream,
-  kSurveyStream,
-  kSourceStream
-};
 
 }  // namespace
 
@@ -46,19 +32,26 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
     sky_index_ = std::make_unique<SkyBinIndex>(sky_bins);
     const std::vector<char> is_indoors =
         survey_interior(scene_, *rays_, faces_, hash_seed(options_.seed, kSurveyStream));
+    check_overlaps(faces_, is_indoors, *rays_);
     const std::vector<float> edges =
         choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
     facts_.maximum_edge_m = *std::min_element(edges.begin(), edges.end());
     mesh_ = std::make_unique<LightMesh>(faces_, edges, options_.elements_per_edge);
     gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_);
-    direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources);
+    const float element_edge = facts_.maximum_edge_m / static_cast<float>(options_.elements_per_edge);
+    direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources, scene_.materials,
+                                                  element_edge * element_edge);
+    beam_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, std::vector<PointSource>{}, scene_.materials,
+                                                element_edge * element_edge);
   }
   std::vector<GatherRow> rows;
   std::vector<int> divisions;
   {
     const TracePhase phase(trace_, "patches");
-    find_patches(first_slots(), rows);
+    patch_of_slot_.assign(static_cast<std::size_t>(mesh_->slot_count()), -1);
+    find_patches(first_wave(), rows);
     mark_interior(rows);
+    find_unseen_patches(rows);
     check_closed(rows);
   }
   {
@@ -67,12 +60,19 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
     assemble_transfer(rows);
     rows.clear();
   }
-  {
-    const TracePhase phase(trace_, "nodes");
-    if (options_.method == Method::kClassic)
-      solve_classic();
-    else
+  if (options_.method == Method::kClassic) {
+    const TracePhase phase(trace_, "forward rays");
+    solve_classic();
+  } else {
+    {
+      const TracePhase phase(trace_, "nodes");
       gather_nodes(divisions);
+    }
+    const TracePhase phase(trace_, "links");
+    light_always();
+    links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes());
+    links_->prepare(beam_slots());
+    facts_.link_bytes = links_->byte_count();
   }
   facts_.face_count = static_cast<int>(faces_.faces.size());
   facts_.patch_count = static_cast<int>(slot_of_patch_.size());
@@ -86,67 +86,6 @@ glm::vec3 Engine::reflectance(int face, Side side) const {
   return side == 1 ? glm::vec3(scene_.openings[material.opening].diffuse_reflectance) : glm::vec3(0);
 }
 
-// The slots from which the search for patches starts: the room sides of openings, and emitters.
-std::vector<int> Engine::first_slots() const {
-  std::vector<int> slots;
-  for (std::size_t f = 0; f < faces_.faces.size(); ++f) {
-    const int face = static_cast<int>(f);
-    const Material& material = scene_.materials[faces_.faces[f].material];
-    const bool is_emitter = material.luminance != glm::vec3(0);
-    for (Side side = 0; side < 2; ++side) {
-      if (material.opening >= 0 ? side == 0 : (!is_emitter || faces_.is_inside_solid(face, side))) continue;
-      for (int cell = 0; cell < mesh_->grid(face).cell_count(); ++cell)
-        slots.push_back(mesh_->slot_index(face, side, cell));
-    }
-  }
-  return slots;
-}
-
-// Rows wave by wave: what a patch sees becomes a patch in the next wave, until nothing new is seen.
-void Engine::find_patches(const std::vector<int>& first, std::vector<GatherRow>& rows) {
-  patch_of_slot_.assign(static_cast<std::size_t>(mesh_->slot_count()), -1);
-  const int per_slot = mesh_->elements_per_slot();
-  std::vector<int> wave = first;
-  for (std::size_t i = 0; i < scene_.point_sources.size(); ++i) {
-    const SobolSequence points(hash_seed(options_.seed, kSourceStream + i));
-    std::vector<Ray> rays;
-    for (int k = 0; k < options_.node_samples.hemisphere; ++k) {
-      const glm::vec2 u = points.point2(static_cast<std::uint32_t>(k));
-      const float z = 1 - 2 * u.x, r = std::sqrt(std::max(0.f, 1 - z * z));
-      rays.push_back({glm::vec3(scene_.point_sources[i].position - faces_.origin),
-                      {r * std::cos(2 * kPi * u.y), r * std::sin(2 * kPi * u.y), z}});
-    }
-    std::vector<Hit> hits(rays.size());
-    rays_->intersect(RayScene::What::kAll, rays, hits);
-    for (const Hit& hit : hits)
-      if (hit.face >= 0 && !faces_.is_inside_solid(hit.face, hit.side))
-        wave.push_back(mesh_->element_at(hit) / per_slot);
-  }
-  std::sort(wave.begin(), wave.end());
-  wave.erase(std::unique(wave.begin(), wave.end()), wave.end());
-
-  while (!wave.empty()) {
-    for (const int slot : wave) {
-      patch_of_slot_[slot] = static_cast<int>(slot_of_patch_.size());
-      slot_of_patch_.push_back(slot);
-    }
-    const std::size_t base = rows.size();
-    rows.resize(base + wave.size());
-    parallel_indices(wave.size(), kGrain, [&](std::size_t i) {
-      const std::uint32_t seed = hash_seed(options_.seed, hash_seed(kPatchStream, static_cast<std::uint64_t>(wave[i])));
-      rows[base + i] = gatherer_->gather_over_patch(wave[i], options_.patch_samples, seed);
-    });
-    std::vector<int> next;
-    for (std::size_t i = base; i < rows.size(); ++i)
-      for (const std::vector<Share>* shares : {&rows[i].reached, &rows[i].through})
-        for (const Share& share : *shares)
-          if (patch_of_slot_[share.index / per_slot] < 0) next.push_back(share.index / per_slot);
-    std::sort(next.begin(), next.end());
-    next.erase(std::unique(next.begin(), next.end()), next.end());
-    wave = std::move(next);
-  }
-}
-
 std::vector<Share> Engine::to_patches(const std::vector<Share>& elements) const {
   std::vector<Share> patches;
   patches.reserve(elements.size());
@@ -156,58 +95,6 @@ std::vector<Share> Engine::to_patches(const std::vector<Share>& elements) const 
   }
   merge_shares(patches);
   return patches;
-}
-
-void Engine::mark_interior(const std::vector<GatherRow>& rows) {
-  is_interior_.assign(rows.size(), 0);
-  std::vector<int> stack;
-  const auto mark = [&](int patch) {
-    if (patch < 0 || is_interior_[patch]) return;
-    is_interior_[patch] = 1;
-    stack.push_back(patch);
-  };
-  // An emitter that sees the sky is a lamp outdoors, or the outside of a luminous wall.
-  for (const int slot : first_slots())
-    if (scene_.materials[faces_.faces[mesh_->slot(slot).face].material].opening >= 0 ||
-        rows[patch_of_slot_[slot]].escaped == 0)
-      mark(patch_of_slot_[slot]);
-  if (!scene_.point_sources.empty())
-    for (std::size_t p = 0; p < rows.size(); ++p) mark(static_cast<int>(p));
-  while (!stack.empty()) {
-    const int patch = stack.back();
-    stack.pop_back();
-    for (const Share& share : rows[patch].reached) mark(patch_of_slot_[share.index / mesh_->elements_per_slot()]);
-  }
-  facts_.interior_patch_count = static_cast<int>(std::count(is_interior_.begin(), is_interior_.end(), 1));
-}
-
-void Engine::check_closed(const std::vector<GatherRow>& rows) {
-  double escaped = 0, total = 0, worst = 0;
-  std::size_t worst_patch = 0;
-  for (std::size_t p = 0; p < rows.size(); ++p) {
-    if (!is_interior_[p]) continue;
-    escaped += rows[p].escaped;
-    total += 1;
-    if (rows[p].escaped > worst) worst = rows[worst_patch = p].escaped;
-  }
-  facts_.leak_share = total > 0 ? escaped / total : 0;
-  if (facts_.leak_share <= kLeakTolerance) return;
-  const Slot slot = mesh_->slot(slot_of_patch_[worst_patch]);
-  const glm::dvec3 place =
-      faces_.origin + glm::dvec3(mesh_->lifted_position(
-                          slot.face, slot.side, mesh_->cell_parameters(slot.face, slot.cell, glm::vec2(1.f / 3))));
-  std::ostringstream text;
-  text.precision(3);
-  if (scene_.materials[faces_.faces[slot.face].material].opening >= 0)
-    text << "face " << faces_.faces[slot.face].source << ", an opening, looks the wrong way near (" << std::fixed
-         << place.x << ", " << place.y << ", " << place.z << ") m: " << 100 * worst
-         << " % of the rays from its back leave the building. Turn its front outdoors";
-  else
-    text << "open wall: " << 100 * facts_.leak_share
-         << " % of the rays in the room leave it without passing an opening, most near (" << std::fixed << place.x
-         << ", " << place.y << ", " << place.z << ") m, face " << faces_.faces[slot.face].source
-         << ". Close the gap, or declare it as an opening with glazing = \"none\"";
-  throw InputError(text.str());
 }
 
 void Engine::assemble_transfer(std::vector<GatherRow>& rows) {
@@ -233,6 +120,16 @@ void Engine::assemble_transfer(std::vector<GatherRow>& rows) {
   }
   connects_emitters_ = emitting < kConnectedShare * interior;
   facts_.defects = make_reciprocal(form_factors_, patch_area_, row_sums);
+  std::vector<PatchPlace> places(n);
+  for (std::size_t p = 0; p < n; ++p) {
+    const Slot slot = mesh_->slot(slot_of_patch_[p]);
+    const Face& face = faces_.faces[slot.face];
+    places[p] = {face.position(mesh_->cell_parameters(slot.face, slot.cell, glm::vec2(1.f / 3))),
+                 slot.side == 0 ? face.normal : -face.normal};
+  }
+  interreflection_ =
+      std::make_unique<Interreflection>(form_factors_, through_, patch_reflectance_, patch_area_, places);
+  facts_.cluster_count = interreflection_->cluster_count();
 }
 
 // Cells are divided where the harmonic mean distance of what they see is short against their size: there irradiance
@@ -275,144 +172,37 @@ void Engine::gather_nodes(const std::vector<int>& divisions) {
   nodes_->finish(std::move(is_exposed));
 }
 
-glm::vec3 Engine::sky_light(const SparseRows& rows, std::size_t row) const {
+// Patches that a beam may light: they see some of the sky.
+std::vector<int> Engine::beam_slots() const {
   const int ground = sky_index_->count() - 1;
-  float sky = 0;
-  glm::vec3 sum(0);
-  for (std::size_t k = rows.begin[row]; k < rows.begin[row + 1]; ++k) {
-    const Share& share = rows.entries[k];
-    if (share.index == ground)
-      sum += share.weight * lighting_.condition.ground_luminance;
-    else
-      sky += share.weight * lighting_.condition.sky_luminance[share.index];
+  std::vector<int> slots;
+  for (std::size_t p = 0; p < slot_of_patch_.size(); ++p) {
+    if (patch_reflectance_[p] == glm::vec3(0)) continue;
+    bool sees_sky = false;
+    for (std::size_t k = patch_sky_.begin[p]; k < patch_sky_.begin[p + 1] && !sees_sky; ++k)
+      sees_sky = patch_sky_.entries[k].index != ground;
+    if (sees_sky) slots.push_back(slot_of_patch_[p]);
   }
-  return sum + sky * lighting_.condition.sky_colour;
+  return slots;
 }
 
-// What nodes are connected to: elements lit by beams, and small emitters.
-std::vector<BrightElement> Engine::bright_elements(const std::vector<LitElement>& lit) const {
+void Engine::light_always() {
   const int per_slot = mesh_->elements_per_slot();
-  std::vector<BrightElement> bright;
-  for (const LitElement& e : lit)
-    bright.push_back({e.element, patch_reflectance_[patch_of_slot_[e.element / per_slot]] * e.illuminance});
-  if (!connects_emitters_) return bright;
-  for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)
-    if (patch_emitted_[p] != glm::vec3(0))
-      for (int e = 0; e < per_slot; ++e) bright.push_back({slot_of_patch_[p] * per_slot + e, patch_emitted_[p]});
-  return bright;
-}
-
-void Engine::relight(Condition condition) {
-  if (options_.method == Method::kClassic) {
-    begin_relight(std::move(condition));
-    while (continue_relight(kShotsAtOnce)) {
-    }
-    return;
-  }
-  condition.validate(sky_index_->count() - 1);
-  lighting_.condition = std::move(condition);
-  const std::size_t n = slot_of_patch_.size();
-  const int per_slot = mesh_->elements_per_slot();
-  std::vector<LitElement> lit;
-  {
-    const TracePhase phase(trace_, "beams");
-    lit = direct_light_->deposit(lighting_.condition.beams, slot_of_patch_, hash_seed(options_.seed, kBeamStream));
-    first_bounce_ = std::make_unique<FirstBounce>(*mesh_, *rays_, bright_elements(lit));
-  }
-  std::vector<glm::vec3> sky(n), from_beams(n, glm::vec3(0)), direct(n);
-  {
-    const TracePhase phase(trace_, "sky");
-    parallel_indices(n, 64, [&](std::size_t p) { sky[p] = sky_light(patch_sky_, p); });
-  }
-  {
-    const TracePhase phase(trace_, "interreflection");
-    lighting_.element_direct.assign(n * static_cast<std::size_t>(per_slot), glm::vec3(0));
-    for (const LitElement& e : lit) {
-      const int patch = patch_of_slot_[e.element / per_slot];
-      const Slot slot = mesh_->slot(e.element / per_slot);
-      from_beams[patch] +=
-          e.illuminance * (mesh_->element_area(slot.face, slot.cell, e.element % per_slot) / patch_area_[patch]);
-      lighting_.element_direct[patch * per_slot + e.element % per_slot] = e.illuminance;
-    }
-    for (std::size_t p = 0; p < n; ++p) direct[p] = sky[p] + from_beams[p];
-    lighting_.patch_irradiance = direct;
-    lighting_.sweeps =
-        solve_interreflection(form_factors_, through_, patch_reflectance_, patch_emitted_, direct, patch_area_,
-                              options_.tolerance, kMaximumSweeps, lighting_.patch_irradiance);
-    lighting_.patch_smooth_radiosity.resize(n);
-    for (std::size_t p = 0; p < n; ++p)
-      lighting_.patch_smooth_radiosity[p] = (connects_emitters_ ? glm::vec3(0) : patch_emitted_[p]) +
-                                            patch_reflectance_[p] * (lighting_.patch_irradiance[p] - from_beams[p]);
-  }
-  {
-    const TracePhase phase(trace_, "gather");
-    const std::size_t node_count = node_sky_.row_count();
-    lighting_.node_sky.resize(node_count);
-    lighting_.node_indirect.resize(node_count);
-    parallel_indices(node_count, 64, [&](std::size_t i) {
-      lighting_.node_sky[i] = sky_light(node_sky_, i);
-      lighting_.node_indirect[i] = node_patches_.dot(i, lighting_.patch_smooth_radiosity);
-      if (nodes_->is_exposed(i))
-        lighting_.node_indirect[i] += first_bounce_->irradiance(nodes_->nodes()[i].position, nodes_->nodes()[i].normal);
-    });
-  }
-}
-
-glm::vec3 Engine::element_radiosity(int element) const {
-  const int per_slot = mesh_->elements_per_slot();
-  const int patch = patch_of_slot_[element / per_slot];
-  if (patch < 0) return glm::vec3(0);
-  return lighting_.patch_smooth_radiosity[patch] + (connects_emitters_ ? patch_emitted_[patch] : glm::vec3(0)) +
-         patch_reflectance_[patch] * lighting_.element_direct[patch * per_slot + element % per_slot];
-}
-
-std::vector<Irradiance> Engine::illuminance(const std::vector<glm::dvec3>& points,
-                                            const std::vector<glm::vec3>& normals, GatherSamples samples) const {
-  std::vector<Irradiance> result(points.size());
-  parallel_indices(points.size(), 1, [&](std::size_t i) {
-    const glm::vec3 normal = glm::normalize(normals[i]);
-    const Node node{glm::vec3(points[i] - faces_.origin) + faces_.ray_offset() * normal, normal};
-    const GatherRow row =
-        gatherer_->gather_at_point(node, samples, hash_seed(options_.seed, hash_seed(kSensorStream, i)));
-    SparseRows sky;
-    sky.append(row.sky);
-    result[i].direct = direct_light_->illuminance(lighting_.condition.beams, node.position, normal);
-    result[i].sky = sky_light(sky, 0);
-    result[i].indirect = first_bounce_->irradiance(node.position, normal);
-    for (const std::vector<Share>* shares : {&row.reached, &row.through})
-      for (const Share& share : to_patches(*shares))
-        result[i].indirect += share.weight * lighting_.patch_smooth_radiosity[share.index];
+  lit_by_sources_ = direct_light_->deposit({}, slot_of_patch_, hash_seed(options_.seed, kBeamStream));
+  bright_always_ = bright_elements(lit_by_sources_);
+  if (connects_emitters_)
+    for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)
+      if (patch_emitted_[p] != glm::vec3(0))
+        for (int e = 0; e < per_slot; ++e)
+          bright_always_.push_back({slot_of_patch_[p] * per_slot + e, patch_emitted_[p]});
+  const std::vector<Node>& nodes = nodes_->nodes();
+  node_always_.assign(nodes.size(), glm::vec3(0));
+  if (bright_always_.empty()) return;
+  const FirstBounce first_bounce(*mesh_, *rays_, bright_always_);
+  parallel_indices(nodes.size(), kGrain, [&](std::size_t i) {
+    if (nodes_->is_exposed(i))
+      node_always_[i] = first_bounce.irradiance(nodes[i].position, nodes[i].normal, FirstBounce::Rays::kOne);
   });
-  return result;
-}
-
-Irradiance Engine::interpolate(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const {
-  if (options_.method == Method::kClassic) {
-    Irradiance constant;
-    const int patch = patch_of_slot_[mesh_->slot_index(face, side, mesh_->grid(face).locate(st).cell)];
-    if (patch < 0) return constant;
-    constant.sky = lighting_.patch_sky[patch];
-    constant.indirect = lighting_.patch_irradiance[patch] - lighting_.patch_sky[patch] - lighting_.patch_sun[patch];
-    return constant;
-  }
-  const NodeShares shares = nodes_->interpolate(face, side, st, lifted_point);
-  Irradiance result;
-  if (shares.count == 0) {  // no node can speak for the point: its patch does
-    const int patch = patch_of_slot_[mesh_->slot_index(face, side, mesh_->grid(face).locate(st).cell)];
-    if (patch < 0) return result;
-    const glm::vec3 normal = side == 0 ? faces_.faces[face].normal : -faces_.faces[face].normal;
-    result.sky = sky_light(patch_sky_, static_cast<std::size_t>(patch));
-    result.indirect = form_factors_.dot(static_cast<std::size_t>(patch), lighting_.patch_smooth_radiosity) +
-                      first_bounce_->irradiance(lifted_point, normal);
-    return result;
-  }
-  for (int k = 0; k < shares.count; ++k) {
-    result.sky += shares.weight[k] * lighting_.node_sky[shares.node[k]];
-    result.indirect += shares.weight[k] * lighting_.node_indirect[shares.node[k]];
-  }
-  result.sky = glm::max(result.sky, glm::vec3(0));
-  result.indirect = glm::max(result.indirect, glm::vec3(0));
-  return result;
 }
 
 }  // namespace transom

@@ -1,5 +1,6 @@
 #include "transom/first_bounce.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -10,14 +11,62 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kFar = 4;  // diameters from which a patch counts as a point: then it errs by about 1 % of its share
-constexpr float kAdjacent = 3;  // diameters below which an element needs its closed form
+constexpr float kAdjacent = 3;         // diameters below which an element needs its closed form
+constexpr float kRaysPerShare = 2000;  // rays to an element for each 1 of form factor
+constexpr int kMostRays = 64;          // to one element
 
 struct Connection {
   Ray ray;
   glm::vec3 irradiance;
 };
 
+// Lifted point of an element, the i-th of a sequence that fills it evenly [Roberts 2018, the R2 sequence].
+glm::vec3 point_of(const ElementShape& shape, int i) {
+  const float u = std::fmod(0.5f + 0.7548776662f * static_cast<float>(i), 1.f),
+              v = std::fmod(0.5f + 0.5698402910f * static_cast<float>(i), 1.f);
+  const glm::vec3* c = shape.corner;
+  if (shape.corner_count == 4) {
+    const glm::vec3 lift = shape.middle - 0.25f * (c[0] + c[1] + c[2] + c[3]);
+    return (1 - u) * (1 - v) * c[0] + u * (1 - v) * c[1] + u * v * c[2] + (1 - u) * v * c[3] + lift;
+  }
+  const glm::vec2 b = u + v > 1 ? glm::vec2(1 - u, 1 - v) : glm::vec2(u, v);
+  const glm::vec3 lift = shape.middle - (c[0] + c[1] + c[2]) / 3.f;
+  return c[0] + b.x * (c[1] - c[0]) + b.y * (c[2] - c[0]) + lift;
+}
+
 }  // namespace
+
+ElementShape element_shape(const LightMesh& mesh, int element_index) {
+  const Slot slot = mesh.slot(element_index / mesh.elements_per_slot());
+  const int element = element_index % mesh.elements_per_slot();
+  const bool is_quad = mesh.grid(slot.face).is_quad;
+  ElementShape shape;
+  shape.corner_count = is_quad ? 4 : 3;
+  const glm::vec2 quad_corner[4]{{0, 0}, {1, 0}, {1, 1}, {0, 1}}, triangle_corner[3]{{0, 0}, {1, 0}, {0, 1}};
+  for (int k = 0; k < shape.corner_count; ++k) {
+    const glm::vec2 local = is_quad ? quad_corner[k] : triangle_corner[k];
+    // In a triangle's grid every second cell is turned; its corners keep their sense, since it is turned by half a
+    // circle.
+    const int place = slot.side == 0 ? k : shape.corner_count - 1 - k;
+    shape.corner[place] =
+        mesh.faces().faces[slot.face].position(mesh.element_parameters(slot.face, slot.cell, element, local));
+  }
+  shape.middle = mesh.lifted_position(
+      slot.face, slot.side,
+      mesh.element_parameters(slot.face, slot.cell, element, is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3)));
+  shape.area = mesh.element_area(slot.face, slot.cell, element);
+  return shape;
+}
+
+float element_share(glm::vec3 point, glm::vec3 normal, const ElementShape& shape, glm::vec3 element_normal) {
+  const glm::vec3 to_element = shape.middle - point;
+  const float distance2 = glm::dot(to_element, to_element);
+  if (distance2 <= kAdjacent * kAdjacent * 2 * shape.area)
+    return point_to_polygon(point, normal, {shape.corner, static_cast<std::size_t>(shape.corner_count)});
+  const float cosine = glm::dot(to_element, normal), height = -glm::dot(to_element, element_normal);
+  if (cosine <= 0 || height <= 0) return 0;
+  return shape.area * cosine * height / (kPi * distance2 * distance2);
+}
 
 FirstBounce::FirstBounce(const LightMesh& mesh, const RayScene& rays, const std::vector<BrightElement>& bright)
     : mesh_(mesh), rays_(rays) {
@@ -25,47 +74,26 @@ FirstBounce::FirstBounce(const LightMesh& mesh, const RayScene& rays, const std:
 }
 
 void FirstBounce::add(const BrightElement& bright) {
-  const int slot_index = bright.element / mesh_.elements_per_slot(),
-            element = bright.element % mesh_.elements_per_slot();
+  const int slot_index = bright.element / mesh_.elements_per_slot();
+  const float strength = bright.radiosity.x + bright.radiosity.y + bright.radiosity.z;
+  if (!(strength > 0)) return;
   const Slot slot = mesh_.slot(slot_index);
   const Face& face = mesh_.faces().faces[slot.face];
-  const glm::vec3 normal = slot.side == 0 ? face.normal : -face.normal;
   if (patches_.empty() || patches_.back().slot != slot_index)
-    patches_.push_back({slot_index, pieces_.size(), pieces_.size(), glm::vec3(0), normal, glm::vec3(0), 0,
+    patches_.push_back({slot_index, pieces_.size(), pieces_.size(), glm::vec3(0),
+                        slot.side == 0 ? face.normal : -face.normal, glm::vec3(0), 0,
                         std::sqrt(2 * mesh_.cell_area(slot.face, slot.cell))});
   LitPatch& patch = patches_.back();
-
-  LitPiece piece;
-  const bool is_quad = mesh_.grid(slot.face).is_quad;
-  piece.corner_count = is_quad ? 4 : 3;
-  const glm::vec2 quad_corner[4]{{0, 0}, {1, 0}, {1, 1}, {0, 1}}, triangle_corner[3]{{0, 0}, {1, 0}, {0, 1}};
-  for (int k = 0; k < piece.corner_count; ++k) {
-    const glm::vec2 local = is_quad ? quad_corner[k] : triangle_corner[k];
-    // Counter-clockwise from the lit side.
-    const int place = slot.side == 0 ? k : piece.corner_count - 1 - k;
-    piece.corner[place] = face.position(mesh_.element_parameters(slot.face, slot.cell, element, local));
-  }
-  // In a triangle's grid every second cell is turned; its corners keep their sense, since it is turned by half a
-  // circle.
-  piece.middle = mesh_.lifted_position(
-      slot.face, slot.side,
-      mesh_.element_parameters(slot.face, slot.cell, element, is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3)));
-  piece.area = mesh_.element_area(slot.face, slot.cell, element);
-  piece.radiosity = bright.radiosity;
-  pieces_.push_back(piece);
-
-  const float weight = piece.area * (bright.radiosity.x + bright.radiosity.y + bright.radiosity.z);
-  if (!(weight > 0)) {
-    pieces_.pop_back();
-    return;
-  }
+  pieces_.push_back({element_shape(mesh_, bright.element), bright.radiosity});
+  const ElementShape& shape = pieces_.back().shape;
+  const float weight = shape.area * strength;
   patch.last_element = pieces_.size();
-  patch.centroid = (patch.centroid * patch.weight + piece.middle * weight) / (patch.weight + weight);
+  patch.centroid = (patch.centroid * patch.weight + shape.middle * weight) / (patch.weight + weight);
   patch.weight += weight;
-  patch.flux += piece.area * piece.radiosity;
+  patch.flux += shape.area * bright.radiosity;
 }
 
-glm::vec3 FirstBounce::irradiance(glm::vec3 point, glm::vec3 normal) const {
+glm::vec3 FirstBounce::irradiance(glm::vec3 point, glm::vec3 normal, Rays precision) const {
   thread_local std::vector<Connection> connections;
   thread_local std::vector<Ray> rays;
   thread_local std::vector<std::uint8_t> blocked;
@@ -79,24 +107,21 @@ glm::vec3 FirstBounce::irradiance(glm::vec3 point, glm::vec3 normal) const {
     const float height = -glm::dot(to_patch, patch.normal);
     if (height <= 0) continue;  // all of a planar patch is seen from behind
     const float distance2 = glm::dot(to_patch, to_patch);
-    if (distance2 > kFar * kFar * patch.size * patch.size) {
+    if (precision == Rays::kOne && distance2 > kFar * kFar * patch.size * patch.size) {
       const float cosine = glm::dot(to_patch, normal);
       if (cosine > 0) connect(patch.centroid, patch.flux * (cosine * height / (kPi * distance2 * distance2)));
       continue;
     }
     for (std::size_t k = patch.first_element; k < patch.last_element; ++k) {
       const LitPiece& piece = pieces_[k];
-      const glm::vec3 to_piece = piece.middle - point;
-      const float d2 = glm::dot(to_piece, to_piece);
-      if (d2 > kAdjacent * kAdjacent * 2 * piece.area) {
-        const float cosine = glm::dot(to_piece, normal), piece_height = -glm::dot(to_piece, patch.normal);
-        if (cosine > 0 && piece_height > 0)
-          connect(piece.middle, piece.radiosity * (piece.area * cosine * piece_height / (kPi * d2 * d2)));
-      } else {
-        const float share =
-            point_to_polygon(point, normal, {piece.corner, static_cast<std::size_t>(piece.corner_count)});
-        if (share > 0) connect(piece.middle, piece.radiosity * share);
-      }
+      const float share = element_share(point, normal, piece.shape, patch.normal);
+      if (share <= 0) continue;
+      const int count =
+          precision == Rays::kOne ? 1 : std::clamp(static_cast<int>(std::ceil(kRaysPerShare * share)), 1, kMostRays);
+      // Another part of the sequence for each element, so that neighbours do not repeat each other.
+      const int first = count == 1 && precision == Rays::kMany ? static_cast<int>(k) : 0;
+      for (int i = 0; i < count; ++i)
+        connect(point_of(piece.shape, first + i), piece.radiosity * (share / static_cast<float>(count)));
     }
   }
   if (connections.empty()) return glm::vec3(0);

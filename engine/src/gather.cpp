@@ -44,6 +44,7 @@ Gatherer::Gatherer(const LightMesh& mesh, const RayScene& rays, const std::vecto
 template <typename OriginOf>
 void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, GatherRow& row) const {
   const SobolSequence points(seed);
+  const std::vector<std::uint32_t>& order = coherent_order(count);
   Ray rays[kBlock];
   Hit hits[kBlock];
   int buried = 0, escaped = 0;
@@ -51,15 +52,17 @@ void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint
   std::vector<Share>& reached = row.reached;
   reached.reserve(static_cast<std::size_t>(count));
   std::vector<int> open_bins;
+  auto next = order.begin();
   for (int begin = 0; begin < count; begin += kBlock) {
     const int size = std::min(kBlock, count - begin);
     for (int i = 0; i < size; ++i) {
-      const glm::vec4 u = points.point4(static_cast<std::uint32_t>(begin + i));
+      while (*next >= static_cast<std::uint32_t>(count)) ++next;
+      const glm::vec4 u = points.point4(*next++);
       const Origin origin = origin_of(glm::vec2(u.z, u.w));
       rays[i] = {origin.position, frame_from_normal(origin.normal) * sample_cosine_hemisphere({u.x, u.y})};
     }
     rays_.intersect(RayScene::What::kAll, {rays, static_cast<std::size_t>(size)},
-                    {hits, static_cast<std::size_t>(size)});
+                    {hits, static_cast<std::size_t>(size)}, RayScene::Order::kCoherent);
     for (int i = 0; i < size; ++i) {
       if (hits[i].face < 0) {
         ++escaped;
@@ -116,11 +119,13 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
     const OpeningTriangle& t = opening_triangles_[k];
     const int n = std::max(kMinimumRaysPerTriangle, static_cast<int>(std::lround(importance[k] / total * count)));
     const SobolSequence points(hash_seed(seed, k + 1));
+    const std::vector<std::uint32_t>& order = coherent_order(n);
     const glm::vec3 normal = mesh_.faces().faces[t.face].normal;
     glm::vec3 seen_from = middle.position;
     SphericalTriangle seen = triangle_from(t, seen_from);
-    for (int i = 0; i < n; ++i) {
-      const glm::vec4 u = points.point4(static_cast<std::uint32_t>(i));
+    for (const std::uint32_t index : order) {
+      if (index >= static_cast<std::uint32_t>(n)) continue;
+      const glm::vec4 u = points.point4(index);
       const Origin origin = origin_of(glm::vec2(u.z, u.w));
       if (origin.position != seen_from) seen = triangle_from(t, seen_from = origin.position);
       glm::vec3 to_opening;
@@ -149,7 +154,7 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
   }
   if (segments.empty()) return;
   std::vector<std::uint8_t> blocked(segments.size());
-  rays_.occluded(RayScene::What::kAll, segments, blocked);
+  rays_.occluded(RayScene::What::kAll, segments, blocked, RayScene::Order::kCoherent);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < segments.size(); ++i) {
     if (blocked[i] || segments[i].t_far <= 0) continue;
@@ -166,7 +171,7 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
     ray.t_far = Ray::kInfinity;
   }
   std::vector<Hit> hits(kept);
-  rays_.intersect(RayScene::What::kOpaque, segments, hits);
+  rays_.intersect(RayScene::What::kOpaque, segments, hits, RayScene::Order::kCoherent);
   const float scale = 1 / row.exposure;
   for (std::size_t i = 0; i < kept; ++i)
     if (hits[i].face >= 0) segments[i].t_far = hits[i].t - offset;

@@ -45,38 +45,50 @@ int find_root(std::vector<int>& parent, int i) {
   return i;
 }
 
-// Faces of closed, outward-looking surfaces: every directed edge is met once by its reverse, and the volume is
-// positive.
+// Faces of closed, outward-looking shells: every directed edge is met once by its reverse, and the volume is positive.
+// Shells hold together through edges of two faces: a box whose corner, or edge, touches another surface is its own.
 void mark_solids(const SceneGeometry& scene, Faces& result) {
   const std::vector<int> welded = weld_vertices(scene.vertices, 1e-7 * result.extent);
   const std::size_t face_count = scene.faces.size();
-  std::vector<int> parent(scene.vertices.size());
+  std::map<std::pair<int, int>, std::vector<int>> sharers;  // faces by edge, from the smaller vertex to the larger
+  const auto each_edge = [&](std::size_t f, const auto& body) {
+    const glm::ivec4& face = scene.faces[f];
+    const int count = face.w >= 0 ? 4 : 3;
+    for (int k = 0; k < count; ++k) body(welded[face[k]], welded[face[(k + 1) % count]]);
+  };
+  for (std::size_t f = 0; f < face_count; ++f)
+    each_edge(f, [&](int a, int b) { sharers[{std::min(a, b), std::max(a, b)}].push_back(static_cast<int>(f)); });
+  std::vector<int> parent(face_count);
   std::iota(parent.begin(), parent.end(), 0);
-  for (const glm::ivec4& face : scene.faces)
-    for (int k = 1; k < (face.w >= 0 ? 4 : 3); ++k)
-      parent[find_root(parent, welded[face[k]])] = find_root(parent, welded[face[0]]);
+  for (const auto& [edge, faces] : sharers)
+    if (faces.size() == 2) parent[find_root(parent, faces[0])] = find_root(parent, faces[1]);
 
-  std::map<std::pair<int, int>, int> directed_edges;
-  std::vector<double> volume(scene.vertices.size(), 0.0);
-  std::vector<char> closed(scene.vertices.size(), 1);
+  std::vector<double> volume(face_count, 0.0);
+  std::vector<char> closed(face_count, 1);
+  for (std::size_t f = 0; f < face_count; ++f)
+    each_edge(f, [&](int a, int b) {
+      const int root = find_root(parent, static_cast<int>(f));
+      int balance = 0;  // of the shell's directions along the edge
+      for (const int other : sharers[{std::min(a, b), std::max(a, b)}]) {
+        if (find_root(parent, other) != root) continue;
+        each_edge(static_cast<std::size_t>(other),
+                  [&](int c, int d) { balance += (c == a && d == b) - (c == b && d == a); });
+      }
+      if (balance != 0) closed[root] = 0;
+    });
   for (std::size_t f = 0; f < face_count; ++f) {
     const glm::ivec4& face = scene.faces[f];
     const int count = face.w >= 0 ? 4 : 3;
-    const int root = find_root(parent, welded[face[0]]);
+    const int root = find_root(parent, static_cast<int>(f));
     if (scene.materials[scene.face_material[f]].opening >= 0) closed[root] = 0;
-    for (int k = 0; k < count; ++k) ++directed_edges[{welded[face[k]], welded[face[(k + 1) % count]]}];
     const glm::dvec3 a = scene.vertices[face[0]] - result.origin;
     for (int k = 2; k < count; ++k)
       volume[root] +=
           glm::dot(a, glm::cross(scene.vertices[face[k - 1]] - result.origin, scene.vertices[face[k]] - result.origin));
   }
-  for (const auto& [edge, times] : directed_edges) {
-    const auto reverse = directed_edges.find({edge.second, edge.first});
-    if (reverse == directed_edges.end() || reverse->second != times) closed[find_root(parent, edge.first)] = 0;
-  }
   std::map<int, int> component_of_root;
   for (Face& face : result.faces) {
-    const int root = find_root(parent, welded[scene.faces[face.source][0]]);
+    const int root = find_root(parent, face.source);
     const auto [entry, is_new] = component_of_root.try_emplace(root, static_cast<int>(component_of_root.size()));
     if (is_new) result.component_is_solid.push_back(closed[root] && volume[root] > 0);
     face.component = entry->second;

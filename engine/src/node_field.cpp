@@ -36,6 +36,7 @@ NodeField::NodeField(const LightMesh& mesh, const RayScene& rays, const std::vec
     const Face& face = mesh.faces().faces[slot.face];
     st = inside_face(grid.is_quad, st, 1.f / (static_cast<float>(division) * glm::vec2(grid.u_count, grid.v_count)));
     const glm::vec3 normal = face.shading_normal(st);
+    surface_of_node_.push_back(2 * slot.face + slot.side);
     return Node{mesh.lifted_position(slot.face, slot.side, st), slot.side == 0 ? normal : -normal};
   };
   std::vector<int> first_of_side(2 * mesh.faces().faces.size(), -1);

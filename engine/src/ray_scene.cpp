@@ -32,21 +32,31 @@ RTCDevice shared_device() {
 
 // Embree 3 takes a context, Embree 4 optional arguments.
 #if TRANSOM_EMBREE_MAJOR >= 4
-void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays) {
-  rtcIntersect16(valid, scene, rays, nullptr);
+void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays, RayScene::Order order) {
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  if (order == RayScene::Order::kCoherent) arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  rtcIntersect16(valid, scene, rays, &arguments);
 }
-void occluded16(const int* valid, RTCScene scene, RTCRay16* rays) {
-  rtcOccluded16(valid, scene, rays, nullptr);
+void occluded16(const int* valid, RTCScene scene, RTCRay16* rays, RayScene::Order order) {
+  RTCOccludedArguments arguments;
+  rtcInitOccludedArguments(&arguments);
+  if (order == RayScene::Order::kCoherent) arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  rtcOccluded16(valid, scene, rays, &arguments);
 }
 #else
-void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays) {
+RTCIntersectContext context_for(RayScene::Order order) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
+  if (order == RayScene::Order::kCoherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  return context;
+}
+void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays, RayScene::Order order) {
+  RTCIntersectContext context = context_for(order);
   rtcIntersect16(valid, scene, &context, rays);
 }
-void occluded16(const int* valid, RTCScene scene, RTCRay16* rays) {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
+void occluded16(const int* valid, RTCScene scene, RTCRay16* rays, RayScene::Order order) {
+  RTCIntersectContext context = context_for(order);
   rtcOccluded16(valid, scene, &context, rays);
 }
 #endif
@@ -121,7 +131,7 @@ RayScene::RayScene(const Faces& faces, const std::vector<Material>& materials,
 
 RayScene::~RayScene() = default;
 
-void RayScene::intersect(What what, std::span<const Ray> rays, std::span<Hit> hits) const {
+void RayScene::intersect(What what, std::span<const Ray> rays, std::span<Hit> hits, Order order) const {
   const Tree& tree = *trees_[static_cast<std::size_t>(what)];
   alignas(64) int valid[kWidth];
   RTCRayHit16 packet;
@@ -132,7 +142,7 @@ void RayScene::intersect(What what, std::span<const Ray> rays, std::span<Hit> hi
       packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
       packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
     }
-    intersect16(valid, tree.scene, &packet);
+    intersect16(valid, tree.scene, &packet, order);
     for (std::size_t i = 0; i < count; ++i) {
       Hit& hit = hits[begin + i];
       if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
@@ -149,14 +159,14 @@ void RayScene::intersect(What what, std::span<const Ray> rays, std::span<Hit> hi
   }
 }
 
-void RayScene::occluded(What what, std::span<const Ray> rays, std::span<std::uint8_t> blocked) const {
+void RayScene::occluded(What what, std::span<const Ray> rays, std::span<std::uint8_t> blocked, Order order) const {
   const Tree& tree = *trees_[static_cast<std::size_t>(what)];
   alignas(64) int valid[kWidth];
   RTCRay16 packet;
   for (std::size_t begin = 0; begin < rays.size(); begin += kWidth) {
     const std::size_t count = std::min(kWidth, rays.size() - begin);
     load_rays(rays.subspan(begin, count), packet, valid);
-    occluded16(valid, tree.scene, &packet);
+    occluded16(valid, tree.scene, &packet, order);
     for (std::size_t i = 0; i < count; ++i) blocked[begin + i] = packet.tfar[i] < 0;
   }
 }

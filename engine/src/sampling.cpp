@@ -1,8 +1,13 @@
 #include "transom/sampling.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <map>
+#include <mutex>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 namespace transom {
 namespace {
@@ -94,6 +99,28 @@ glm::vec2 SobolSequence::point2(std::uint32_t index) const {
 glm::vec4 SobolSequence::point4(std::uint32_t index) const {
   return {coordinate(index, 0, seeds_[0]), coordinate(index, 1, seeds_[1]), coordinate(index, 2, seeds_[2]),
           coordinate(index, 3, seeds_[3])};
+}
+
+const std::vector<std::uint32_t>& coherent_order(int count) {
+  static std::mutex mutex;
+  static std::map<std::uint32_t, std::vector<std::uint32_t>> orders;
+  const std::lock_guard lock(mutex);
+  const std::uint32_t size = std::bit_ceil(static_cast<std::uint32_t>(std::max(count, 1)));
+  std::vector<std::uint32_t>& order = orders[size];
+  if (!order.empty()) return order;
+  int bits = 0;  // of each coordinate: cells of about sixteen points
+  while ((16u << (2 * (bits + 1))) <= size) ++bits;
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> by_cell;
+  for (std::uint32_t index = 0; index < size; ++index) {
+    std::uint64_t interleaved = 0;
+    for (int bit = 1; bit <= bits; ++bit)
+      for (const int dimension : {0, 1})
+        interleaved = 2 * interleaved + ((plain_coordinate(index, dimension) >> (32 - bit)) & 1u);
+    by_cell.push_back({interleaved, index});
+  }
+  std::sort(by_cell.begin(), by_cell.end());
+  for (const auto& [cell, index] : by_cell) order.push_back(index);
+  return order;
 }
 
 glm::vec2 sample_disc(glm::vec2 u) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <sstream>
 
 #include "transom/error.h"
@@ -15,6 +16,7 @@ namespace {
 constexpr double kSameDirection = 1e-9;  // between unit vectors that are one exit
 constexpr double kClose = 1e-9;          // of the period: a hit nearer than this is where the path is
 constexpr std::size_t kGrain = 16;
+constexpr std::size_t kFewExits = 256;
 
 /// Intensity and polarisation against the axis `reference`, which is perpendicular to the direction.
 struct Stokes {
@@ -90,8 +92,9 @@ glm::dvec3 perpendicular(glm::dvec3 direction) {
   return glm::normalize(glm::cross(direction, axis));
 }
 
+// Exits of one direction become one, as long as there are few of them: sections of flat faces have few.
 void add_exit(std::vector<Exit>& exits, glm::dvec3 direction, double flux) {
-  for (Exit& exit : exits) {
+  for (Exit& exit : std::span(exits).first(std::min(exits.size(), kFewExits))) {
     const glm::dvec3 apart = exit.direction - direction;
     if (glm::dot(apart, apart) < kSameDirection * kSameDirection) {
       exit.flux += flux;
@@ -257,10 +260,19 @@ void Tracer::meet(const Branch& branch, const Line& line, SectionLight& light) {
         divide(branch, s, through, {mirrored, Mueller{rho, rho, -rho, 0} * incident});
       } else {
         const double tau = closed * line.transmittance;
-        push(branch, through.direction, s, through.light);
-        scatter(branch, normal, rho * incident.i);
-        scatter(branch, -normal, tau * incident.i);
         used += tau;
+        if (incident.i >= options_.split_share) {
+          push(branch, through.direction, s, through.light);
+          scatter(branch, normal, rho * incident.i);
+          scatter(branch, -normal, tau * incident.i);
+        } else if (used > 0) {  // one way by chance, with the flux of all
+          const double choice = used * hash_seed(next_stream(branch), 0) / 4294967296.0;
+          const double scale = used / std::max(open, 1e-300);
+          if (choice < open)
+            push(branch, through.direction, s, Mueller{scale, scale, scale, 0} * through.light);
+          else
+            scatter(branch, choice < open + rho ? normal : -normal, used * incident.i);
+        }
       }
       light.absorbed += (1 - used) * incident.i;
       break;

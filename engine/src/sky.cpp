@@ -51,17 +51,22 @@ void Condition::validate(int sky_bin_count) const {
   for (const float l : sky_luminance)
     if (!(l >= 0 && std::isfinite(l))) throw InputError("the sky vector holds a value that is negative or not finite");
   for (const Beam& beam : beams) {
-    if (std::abs(glm::length(beam.direction_to_source) - 1) > 1e-3f)
+    if (!(std::abs(glm::length(beam.direction_to_source) - 1) <= 1e-3f))
       throw InputError("the direction of a beam is not a unit vector");
     for (int c = 0; c < 3; ++c)
       if (!(beam.normal_illuminance[c] >= 0 && std::isfinite(beam.normal_illuminance[c])))
         throw InputError("the illuminance of a beam is negative or not finite");
   }
   for (int c = 0; c < 3; ++c)
-    if (!(ground_luminance[c] >= 0 && std::isfinite(ground_luminance[c])) || !(sky_colour[c] >= 0))
+    if (!(ground_luminance[c] >= 0 && std::isfinite(ground_luminance[c])) ||
+        !(sky_colour[c] >= 0 && std::isfinite(sky_colour[c])))
       throw InputError("the ground's luminance or the sky's colour is negative or not finite");
   if (picture.size() != static_cast<std::size_t>(picture_width) * static_cast<std::size_t>(picture_height))
     throw InputError("the picture of the sky does not have width x height texels");
+  for (const glm::vec3& texel : picture)
+    for (int c = 0; c < 3; ++c)
+      if (!(texel[c] >= 0 && std::isfinite(texel[c])))
+        throw InputError("the picture of the sky holds a value that is negative or not finite");
 }
 
 glm::vec3 Condition::seen(glm::vec3 direction, const SkyBinIndex& bins) const {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "transom/parallel.h"
 #include "transom/sampling.h"
 
 namespace transom {
@@ -11,9 +12,15 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr int kRaysPerSource = 256;         // from each face or point that light starts at
+constexpr std::uint32_t kRaysPerSlot = 16;  // of a slot that no patch has seen
+constexpr int kLeastSeen = 2;               // of them on patches indoors: one may have slipped through an edge
 constexpr int kReflections = 6;             // followed to find what lies indoors
 constexpr float kHollowShare = 0.25f;       // of a source's rays on the inside of a solid: then it is a room
 constexpr double kOutdoorPatchCount = 400;  // at most about so many patches outdoors
+
+char side_bit(Side side) {
+  return static_cast<char>(1 << side);
+}
 
 glm::vec3 sample_sphere(glm::vec2 u) {
   const float z = 1 - 2 * u.x, r = std::sqrt(std::max(0.f, 1 - z * z));
@@ -49,7 +56,7 @@ class Surveyor {
           // A luminous solid may be a room with luminous walls: its inside must speak for itself.
           if (!sees_only_itself(static_cast<int>(f))) continue;
         }
-        is_indoors_[f] = 1;
+        is_indoors_[f] |= side_bit(side);
         start_from(static_cast<int>(f), side);
         follow();
       }
@@ -94,7 +101,7 @@ class Surveyor {
         const Hit& hit = hits_[i];
         if (hit.face < 0 || faces_.is_inside_solid(hit.face, hit.side)) continue;
         if (scene_.materials[faces_.faces[hit.face].material].opening >= 0) continue;
-        is_indoors_[hit.face] = 1;
+        is_indoors_[hit.face] |= side_bit(hit.side);
         Ray next;
         next.origin =
             leave(faces_, hit.face, hit.side, hit.st, points.point2(static_cast<std::uint32_t>(i)), next.direction);
@@ -128,6 +135,35 @@ class Surveyor {
 
 std::vector<char> survey_interior(const SceneGeometry& scene, const RayScene& rays, Faces& faces, std::uint32_t seed) {
   return Surveyor(scene, rays, faces, seed).run();
+}
+
+std::vector<int> slots_that_see(const std::vector<char>& is_interior, const std::vector<int>& patch_of_slot,
+                                const LightMesh& mesh, const RayScene& rays, std::uint32_t seed) {
+  std::vector<char> sees(patch_of_slot.size(), 0);
+  parallel_indices(patch_of_slot.size(), 64, [&](std::size_t i) {
+    const int index = static_cast<int>(i);
+    const Slot slot = mesh.slot(index);
+    if (patch_of_slot[i] >= 0 || mesh.faces().is_inside_solid(slot.face, slot.side)) return;
+    const SobolSequence points(hash_seed(seed, i));
+    Ray own[kRaysPerSlot];
+    Hit hits[kRaysPerSlot];
+    for (std::uint32_t k = 0; k < kRaysPerSlot; ++k) {
+      const glm::vec4 u = points.point4(k);
+      const glm::vec2 st = mesh.cell_parameters(slot.face, slot.cell, mesh.sample_local(slot.face, {u.z, u.w}));
+      own[k].origin = leave(mesh.faces(), slot.face, slot.side, st, {u.x, u.y}, own[k].direction);
+    }
+    rays.intersect(RayScene::What::kAll, own, hits);
+    int seen = 0;
+    for (const Hit& hit : hits) {
+      if (hit.face < 0) return;  // outdoors
+      seen += is_interior[mesh.element_at(hit) / mesh.elements_per_slot()];
+    }
+    sees[i] = seen >= kLeastSeen;
+  });
+  std::vector<int> found;
+  for (std::size_t i = 0; i < sees.size(); ++i)
+    if (sees[i]) found.push_back(static_cast<int>(i));
+  return found;
 }
 
 std::vector<float> choose_edges(const Faces& faces, const std::vector<char>& is_indoors, float maximum_edge,

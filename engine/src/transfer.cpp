@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
+
+#include "transom/parallel.h"
 
 namespace transom {
 namespace {
@@ -12,6 +13,8 @@ namespace {
 constexpr float kSelfShare = 1e-5f;
 
 constexpr int kMaximumScalings = 100;
+constexpr int kPlainScalings = 12;  // before Newton's method, which is costly where it is far from the solution
+constexpr std::size_t kGrain = 64;  // rows at once
 constexpr double kRowSumTolerance = 1e-7;
 constexpr double kLargestStep = 1.0;  // of a logarithm of a scale
 constexpr int kMaximumGradientSteps = 300;
@@ -122,19 +125,25 @@ TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<floa
   const std::vector<double> ones(n, 1.0);
   const auto worst_row_sum = [&] {
     double worst = 0;
+    parallel_indices(n, kGrain, [&](std::size_t i) { sum[i] = scaled_product(i, ones); });
     for (std::size_t i = 0; i < n; ++i) {
-      sum[i] = scaled_product(i, ones);
       residual[i] = sum[i] > 0 ? areas[i] * static_cast<double>(row_sums[i]) - sum[i] : 0;
       if (sum[i] > 0) worst = std::max(worst, std::abs(residual[i]) / areas[i]);
     }
     return worst;
   };
   defects.raw_row_sum = defects.row_sum = worst_row_sum();
+  for (int k = 0; k < kPlainScalings && defects.row_sum > kRowSumTolerance; ++k) {
+    for (std::size_t i = 0; i < n; ++i)
+      if (sum[i] > 0) scale[i] *= std::sqrt(areas[i] * static_cast<double>(row_sums[i]) / sum[i]);
+    defects.row_sum = worst_row_sum();
+  }
   for (; defects.row_sum > kRowSumTolerance && defects.iterations < kMaximumScalings; ++defects.iterations) {
     // Newton's step for the logarithms of the scales: (diag(sum) + D S D) step = residual, by conjugate gradients.
     solve_positive_definite(
         [&](const std::vector<double>& x, std::vector<double>& y) {
-          for (std::size_t i = 0; i < n; ++i) y[i] = sum[i] > 0 ? sum[i] * x[i] + scaled_product(i, x) : x[i];
+          parallel_indices(n, kGrain,
+                           [&](std::size_t i) { y[i] = sum[i] > 0 ? sum[i] * x[i] + scaled_product(i, x) : x[i]; });
         },
         sum, residual, step);
     double largest = 0;
@@ -159,28 +168,6 @@ TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<floa
       defects.reciprocity = std::max(defects.reciprocity, std::abs(forth - back) / std::max(areas[i], areas[j]));
     }
   return defects;
-}
-
-int solve_interreflection(const SparseRows& form_factors, const SparseRows& through,
-                          const std::vector<glm::vec3>& reflectance, const std::vector<glm::vec3>& emitted,
-                          const std::vector<glm::vec3>& direct, const std::vector<float>& areas, double tolerance,
-                          int maximum_sweeps, std::vector<glm::vec3>& irradiance) {
-  const std::size_t n = form_factors.row_count();
-  std::vector<glm::vec3> radiosity(n);
-  for (std::size_t i = 0; i < n; ++i) radiosity[i] = emitted[i] + reflectance[i] * irradiance[i];
-  for (int sweep = 1; sweep <= maximum_sweeps; ++sweep) {
-    double change = 0, total = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-      const glm::vec3 e = direct[i] + form_factors.dot(i, radiosity) + through.dot(i, radiosity);
-      const glm::vec3 difference = glm::abs(e - irradiance[i]) * reflectance[i];
-      change += static_cast<double>(areas[i]) * (difference.x + difference.y + difference.z);
-      irradiance[i] = e;
-      radiosity[i] = emitted[i] + reflectance[i] * e;
-      total += static_cast<double>(areas[i]) * (radiosity[i].x + radiosity[i].y + radiosity[i].z);
-    }
-    if (!(change > tolerance * total)) return sweep;
-  }
-  throw std::runtime_error("interreflection has not converged: is the room closed and almost perfectly white?");
 }
 
 }  // namespace transom

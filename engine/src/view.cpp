@@ -16,6 +16,9 @@ void View::validate() const {
   if (!(vertical_fov_rad > 0 && vertical_fov_rad < std::numbers::pi))
     throw InputError("the vertical field of view is outside 0..180 degrees");
   const glm::dvec3 forward = target - position;
+  for (int axis = 0; axis < 3; ++axis)
+    if (!std::isfinite(position[axis]) || !std::isfinite(target[axis]) || !std::isfinite(up[axis]))
+      throw InputError("the camera's position, target or up direction is not finite");
   if (!(glm::length(glm::cross(forward, up)) > 1e-9 * glm::length(forward) * glm::length(up)))
     throw InputError("the camera's target is at its position, or straight along its up direction");
 }

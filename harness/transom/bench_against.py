@@ -38,6 +38,8 @@ GENERATION_ROUNDS = 8
 """Processes are started anew after so many rounds: where memory happens to lie makes one faster than another."""
 
 ORDER_SEED = 1
+LEAST_WHOLE_MS = 10.0
+"""From here on, tenths of a millisecond are enough digits."""
 
 
 class Timed(Protocol):
@@ -123,7 +125,7 @@ def compare_builds(
         if suspects:
             wanted = {name.split("/")[0] for name in suspects}
             again_request = [entry for entry in request if entry[0] in wanted]
-            progress.total_cases += 2
+            progress.extend(2)
             second = _fresh_comparison(base, ours, folder / "second", setup, again_request, rounds, progress)
             again = {name: speed_change(second.times[name], len(suspects)) for name in suspects if name in second.times}
     rows = [
@@ -266,4 +268,5 @@ def _always(entries: Sequence[Mapping[str, float]]) -> list[str]:
 
 
 def _milliseconds(seconds: float) -> str:
-    return f"{1e3 * seconds:.4g} ms"
+    milliseconds = 1e3 * seconds
+    return f"{milliseconds:.1f} ms" if milliseconds >= LEAST_WHOLE_MS else f"{milliseconds:.3f} ms"

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import typer
 
-from transom.commands import benching, judging, listing, picture, products, running, sensing, status, tracing
+from transom.commands import benching, checking, judging, listing, picture, products, running, sensing, status, tracing
 from transom.errors import InputError
 
 WRONG_USE = 2
@@ -40,7 +40,10 @@ COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
     "report": (judging.report, "Run and time everything; write the report."),
     "bench": (benching.bench, "Time a scene; or two builds against each other."),
     "trace": (tracing.trace, "Where the time goes, for Perfetto."),
+    "measure": (products.measure, "Trace light through a product; its tables as Klems XML."),
     "bsdf": (products.bsdf, "Check a product's BSDF file; export it as Klems XML."),
+    "check": (checking.check, "Has accuracy changed? References, and our own baseline."),
+    "bless": (checking.bless, "Accept the present answers as a suite's baseline."),
     "list": (listing.list_names, "List scenes, views, suites or products."),
     "doctor": (listing.doctor, "Say what the set-up looks like."),
 }

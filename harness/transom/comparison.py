@@ -72,9 +72,10 @@ class CrossCheck:
     """One quantity of one case by two references, which must agree before either judges the engine.
 
     first, second: renderers with their preset ("radiance accurate"). view: "" for sensors. quantity: "image mean",
-    "image blocks" (mean |relative difference| of 4x4 blocks, noise removed), "sensor" (one row each, region = its set
-    and number). difference_percent: of first from second, signed where the quantity has a sign. physics: "matched"
-    (what the engine simplifies, they simplify too) or "full". note: what explains a difference that is larger.
+    "image blocks" (root mean square relative difference of blocks, noise removed), "sensor" (mean relative difference
+    over a scene's checked sensors; each is in the note). difference_percent: of first from second, signed where the
+    quantity has a sign. physics: "matched" (what the engine simplifies, they simplify too) or "full". note: what
+    explains a difference that is larger, and what is too noisy to be judged.
     """
 
     scene: str

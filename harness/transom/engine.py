@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Literal, Self
 
@@ -50,7 +52,7 @@ class SolveOptions:
     node_rays: int = 1024
     node_opening_rays: int = 256
     node_spacing: float = 6.0
-    tolerance: float = 1e-6
+    tolerance: float = 1e-4
     seed: int = 1
 
 
@@ -103,8 +105,13 @@ class Engine:
         return cls(scene, options, sky_bins, core)
 
     def relight(self, condition: Condition) -> None:
-        """Finds the light of a condition; the geometry is not looked at again."""
-        self._core.relight(self._core_condition(condition))
+        """Finds the light of a condition; the geometry is not looked at again.
+
+        Raises InputError for light that is negative or not finite; the engine then keeps the light that it had.
+        """
+        core_condition = self._core_condition(condition)
+        with self._input_errors(condition):
+            self._core.relight(core_condition)
         self.condition = condition
 
     def relight_in_steps(self, condition: Condition, shots: int = 64) -> Iterator[float]:
@@ -116,13 +123,23 @@ class Engine:
         if self.options.method != "classic":
             remedy = 'Solve with method "classic"'
             raise InputError("cannot relight in steps", field="method", value=self.options.method, remedy=remedy)
-        self._core.begin_relight(self._core_condition(condition))
+        core_condition = self._core_condition(condition)
+        with self._input_errors(condition):
+            self._core.begin_relight(core_condition)
         self.condition = condition
         more = True
         while more:
             yield float(self._core.unshot_share)
             more = self._core.continue_relight(shots)
         yield float(self._core.unshot_share)
+
+    @contextmanager
+    def _input_errors(self, condition: Condition) -> Iterator[None]:
+        """The engine's errors about a condition, with the condition's place."""
+        try:
+            yield
+        except _engine.EngineInputError as error:
+            raise InputError(str(error), file=self.scene.file, field=f"conditions.{condition.name}") from None
 
     def _core_condition(self, condition: Condition) -> _engine.Condition:
         sky_picture = condition.environment_image(SKY_PICTURE_HEIGHT)
@@ -136,18 +153,22 @@ class Engine:
             core_condition.add_beam(_triple(condition.sun_direction), _triple(condition.sun_illuminance_rgb))
         return core_condition
 
-    def render(self, view: View, visibility: Visibility = "rays", *, edge_samples: int = 4) -> Frame:
+    def render(
+        self, view: View, visibility: Visibility = "rays", *, edge_samples: int = 4, components: bool = True
+    ) -> Frame:
         """The present light from a camera. visibility: sun by shadow rays or by stencil shadow volumes.
 
-        edge_samples: samples a pixel and axis where an edge crosses a pixel; 1: pixel centres only.
+        edge_samples: samples a pixel and axis where an edge crosses a pixel; 1: pixel centres only. components: False
+        leaves `Frame.components` empty, which is faster. A further picture of the last view, under whatever light, is
+        several times as fast as the first: what the camera sees is kept.
         """
         self._require_light()
         method = _engine.Visibility.VOLUMES if visibility == "volumes" else _engine.Visibility.RAYS
         try:
-            result = self._core.render(_core_view(view), method, edge_samples)
+            result = self._core.render(_core_view(view), method, edge_samples, components)
         except _engine.EngineInputError as error:
             raise InputError(str(error), file=self.scene.file, field=f"views.{view.name}") from None
-        names = ("sun", "sky", "indirect", "emitted", "exterior")
+        names = ("sun", "sky", "indirect", "emitted", "exterior") if components else ()
         return Frame(result["radiance"], {name: result[name] for name in names}, result["edge_pixel_count"])
 
     def illuminance(
@@ -156,8 +177,10 @@ class Engine:
         """Illuminance at points (N, 3) [m] with unit normals (N, 3): "direct", "sky", "indirect" and "total".
 
         Each (N, 3), linear RGB whose Y is lux. rays, opening_rays: samples a point.
+        Raises InputError for a point that is not finite or a normal without a direction.
         """
         self._require_light()
+        _check_sensors(points, normals, self.scene)
         parts = self._core.illuminance(
             np.ascontiguousarray(points, dtype=np.float64),
             np.ascontiguousarray(normals, dtype=np.float32),
@@ -186,6 +209,8 @@ class Engine:
             "nodes": facts.node_count,
             "maximum_edge_m": facts.maximum_edge_m,
             "leak_share": facts.leak_share,
+            "clusters": facts.cluster_count,
+            "link_bytes": facts.link_bytes,
             "form_factor_defects": {
                 "raw_reciprocity": defects.raw_reciprocity,
                 "raw_row_sum": defects.raw_row_sum,
@@ -206,7 +231,7 @@ class Engine:
 
     @property
     def sweeps(self) -> int:
-        """Gauss-Seidel sweeps of the last relighting."""
+        """Cycles of interreflection of the last relighting."""
         return int(self._core.sweeps)
 
     @property
@@ -230,6 +255,28 @@ def trace_primary(scene: Scene, view: View) -> tuple[NDArray[np.int32], Float32,
     is_opaque_face = np.array([scene.materials[m].opening < 0 for m in scene.mesh.face_material])
     interior = (face >= 0) & is_opaque_face[np.maximum(face, 0)]
     return face, position.astype(np.float32), interior
+
+
+def _check_sensors(points: Float64, normals: Float64, scene: Scene) -> None:
+    usable = np.isfinite(points).all(axis=1) & np.isfinite(normals).all(axis=1)
+    usable &= np.linalg.norm(normals, axis=1) > 0
+    if usable.all():
+        return
+    index = int(np.flatnonzero(~usable)[0])
+    raise InputError(
+        f"with the normal {normals[index].tolist()} is not finite, or its normal has no direction",
+        file=scene.file,
+        field=f"sensor {index}",
+        value=points[index].tolist(),
+        remedy="Give finite coordinates and a normal such as [0, 0, 1]",
+    )
+
+
+@contextmanager
+def thread_limit(count: int) -> Iterator[None]:
+    """A `with` block in which the engine uses at most so many threads; its answers do not depend on them."""
+    with _engine.ThreadLimit(count):
+        yield
 
 
 def build_description() -> str:
@@ -284,11 +331,12 @@ def _core_view(view: View) -> _engine.View:
 
 
 def _with_object_names(text: str, scene: Scene) -> str:
-    """The engine's message, with the mesh's own name for the face that it numbers."""
-    words = text.split("face ")
-    if len(words) < 2 or not words[1].split(",")[0].split(" ")[0].strip(".").isdigit():
-        return text
-    face = int(words[1].split(",")[0].split(" ")[0].strip("."))
-    material = scene.materials[int(scene.mesh.face_material[face])].name
-    owner = scene.mesh.objects[scene.mesh.face_object[face]]
-    return f"{text} (face {face} belongs to object {owner!r}, material {material!r})"
+    """The engine's message, with the scene's own names for the faces and the material that it numbers."""
+    names = []
+    for face in dict.fromkeys(int(number) for number in re.findall(r"\bface (\d+)", text)):
+        material = scene.materials[int(scene.mesh.face_material[face])].name
+        owner = scene.mesh.objects[scene.mesh.face_object[face]]
+        names.append(f"face {face} belongs to object {owner!r}, material {material!r}")
+    materials = dict.fromkeys(int(number) for number in re.findall(r"\bmaterial (\d+)", text))
+    names += [f"material {index} is {scene.materials[index].name!r}" for index in materials]
+    return f"{text} ({'; '.join(names)})" if names else text

@@ -32,6 +32,9 @@ NO_VALUE_INDEX = 255
 
 SCALE_STEPS = 64
 
+CRISP = 'shape-rendering="crispEdges"'
+"""Without it the steps of a scale are drawn with seams between them."""
+
 TONE_TICKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Labels of a toned picture's scale, as shares of its white."""
 
@@ -119,7 +122,7 @@ def _bar_svg(colours: Sequence[str], labels: Sequence[tuple[float, str]], title:
     width, left, bar = 320, 18, 284
     step = bar / len(colours)
     parts = [
-        f'<rect x="{left + index * step:.2f}" y="0" width="{step + 0.3:.2f}" height="9" fill="{colour}"/>'
+        f'<rect x="{left + index * step:.2f}" y="0" width="{step + 0.3:.2f}" height="9" fill="{colour}" {CRISP}/>'
         for index, colour in enumerate(colours)
     ]
     for position, label in labels:
@@ -189,72 +192,3 @@ def _tick(value: float, scale: Scale) -> str:
     text = f"{abs(value):,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}")
     sign = ("+" if value > 0 else "\N{MINUS SIGN}" if value < 0 else "") if scale.kind == "signed" else ""
     return sign + text
-
-
-@dataclass(frozen=True)
-class SpeedPoint:
-    """One program at one setting: time of its repeats [s], and its error with standard uncertainty [%]."""
-
-    program: str
-    phase: str
-    low_s: float
-    median_s: float
-    high_s: float
-    error_percent: float
-    uncertainty_percent: float
-
-
-PROGRAM_STYLES = (("#1f4e79", "o"), ("#b3541e", "s"), ("#2f7d5d", "^"), ("#6b4c9a", "D"), ("#555555", "v"))
-"""Colour and mark of each program in turn: told apart without colour, too."""
-
-
-def speed_error_svg(points: Sequence[SpeedPoint]) -> str:
-    """Error against time on logarithmic axes, one panel a phase, one line a program."""
-    from matplotlib.figure import Figure
-
-    phases = list(dict.fromkeys(point.phase for point in points))
-    programs = list(dict.fromkeys(point.program for point in points))
-    settings: dict[Any, object] = {"svg.fonttype": "none", "svg.hashsalt": "transom", "font.size": 9}
-    with mpl.rc_context(settings):
-        figure = Figure(figsize=(4.8 * max(len(phases), 2), 3.7), layout="constrained")
-        panels = figure.subplots(1, len(phases), squeeze=False, sharey=True)[0]
-        for axes, phase in zip(panels, phases, strict=True):
-            for program, (colour, mark) in zip(programs, PROGRAM_STYLES, strict=False):
-                members = sorted(
-                    (point for point in points if (point.program, point.phase) == (program, phase)),
-                    key=lambda point: point.median_s,
-                )
-                if not members:
-                    continue
-                times = [point.median_s for point in members]
-                spread = [
-                    [point.median_s - point.low_s for point in members],
-                    [point.high_s - point.median_s for point in members],
-                ]
-                errors = [point.error_percent for point in members]
-                noise = [min(point.uncertainty_percent, 0.95 * point.error_percent) for point in members]
-                axes.errorbar(
-                    *(times, errors),
-                    xerr=spread,
-                    yerr=noise,
-                    color=colour,
-                    marker=mark,
-                    markersize=4.5,
-                    linewidth=1.3,
-                    elinewidth=0.8,
-                    label=program,
-                )
-            axes.set_xscale("log")
-            axes.set_yscale("log")
-            axes.set_xlabel("time [s]")
-            axes.set_title(phase, fontsize=9, loc="left")
-            axes.grid(which="major", color="#e6e3dc", linewidth=0.7)
-            axes.set_axisbelow(True)
-            for side in ("top", "right"):
-                axes.spines[side].set_visible(False)
-        panels[0].set_ylabel("mean pixel error [%]")
-        panels[0].legend(frameon=False, fontsize=8)
-        stream = io.StringIO()
-        figure.savefig(stream, format="svg", metadata={"Date": None}, transparent=True)
-    text = stream.getvalue()
-    return text[text.index("<svg") :]

@@ -41,6 +41,12 @@ class CaseProgress:
         self._all: TaskID = self._bars.add_task(f"0 of {total_cases} cases", total=self._total_weight, left="")
         self._case: TaskID | None = None
 
+    def extend(self, cases: int) -> None:
+        """So many more cases have turned up, each of weight 1."""
+        self.total_cases += cases
+        self._total_weight += cases
+        self._bars.update(self._all, total=self._total_weight)
+
     def begin(self, label: str, weight: float = 1.0) -> None:
         """A case begins, which is `weight` of all the work."""
         self._label, self._weight = label, weight

@@ -1,4 +1,4 @@
-"""The published references: rendered once with Mitsuba, kept in the repository (reference/store/)."""
+"""The published references: rendered once, kept in the repository (reference/store/)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from functools import partial
 from rich.console import Console
 
 from transom.bundle import Store, cache_store, repository_store
+from transom.known.suite import run_known_references
 from transom.progress import CaseProgress
 from transom.renderer import Renderer, load_renderer
 from transom.run import Question, free_first, reference_questions, render_case
@@ -51,6 +52,9 @@ def run_references(scenes: Collection[str], *, fresh: bool = False) -> None:
             free_first(questions, partial(_run_stage, renderer, store, bars, stage, fresh and stage == STAGES[0]))
     for question in questions:
         cache_store().drop_batches(question.case)
+    for name, entry in read_suites().items():
+        if entry.reference == "closed_form":
+            run_known_references(load_suite(name), scenes, fresh=fresh)
 
 
 def _run_stage(

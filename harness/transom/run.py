@@ -23,7 +23,7 @@ from transom.renderer import ImageResult, Progress, Renderer, SensorResult
 from transom.scene.model import Scene, View
 from transom.sensor_file import SensorTable, scene_sensors
 from transom.staging import sweep
-from transom.suite import Suite
+from transom.suite import Suite, SuiteCase
 from transom.visible import first_surfaces, region_masks
 
 SENSOR_TARGET_PERCENT = 0.2
@@ -40,6 +40,8 @@ PREVIEW_BATCHES = 8
 
 JUDGED_PERCENT = 1.0
 """References at least so quiet are judged against, and have LEAST_BATCHES."""
+
+DEFAULT_METHOD = "gather"
 
 COARSE_VISIBILITY = "volumes"
 """Visibility method of the solve with fewer patches; the other method's picture changes with it alike."""
@@ -131,9 +133,10 @@ def _render(
         return _render_in_batches(renderer, question, store, progress, started, keep_batches)
     if case.view is not None:
         image = renderer.render(case.scene, case.condition, case.view, case.options, progress)
+        is_engine = renderer.name == "engine"  # Engine pictures are compared bit by bit with one another.
         facts, trace = _without_trace(image.facts)
         seconds = time.perf_counter() - started
-        return store.write(case, image=image, facts=facts, trace=trace, wall_seconds=seconds, half=False)
+        return store.write(case, image=image, facts=facts, trace=trace, wall_seconds=seconds, half=not is_engine)
     table, facts = _measure(renderer, case, case.options, progress)
     return store.write(case, sensors=table, facts=facts, wall_seconds=time.perf_counter() - started)
 
@@ -170,23 +173,37 @@ def reference_questions(suite: Suite, renderer: Renderer, options: Mapping[str, 
 def engine_questions(suite: Suite, renderer: Renderer, visibilities: tuple[str, ...]) -> Iterator[Question]:
     """The engine's cases of a suite: every view by every visibility method, and every scene's sensors.
 
-    Then, for suites that are shown view by view, the same with fewer patches (`coarse_options`).
+    Then, for suites that are shown view by view, the same with fewer patches (`coarse_options`); not for the published
+    method, which is shown as it is.
     """
     for entry in suite.cases:
         table = scene_sensors(entry.scene) if entry.sensors else None
         if table is not None:
-            yield Question(make_case(entry.scene, entry.condition, renderer, {}, sensors=table))
+            options = method_options(entry)
+            yield Question(make_case(entry.scene, entry.condition, renderer, options, sensors=table))
         for view in entry.views:
-            for visibility in visibilities:
-                options = {"visibility": visibility}
+            for visibility in chosen_visibilities(entry, visibilities):
+                options = method_options(entry, visibility)
                 yield Question(make_case(entry.scene, entry.condition, renderer, options, view=view))
     coarse = coarse_options(renderer)
-    for entry in suite.cases if coarse is not None and suite.layout == "views" else ():
+    refined = [entry for entry in suite.cases if entry.method == DEFAULT_METHOD]
+    for entry in refined if coarse is not None and suite.layout == "views" else ():
         table = scene_sensors(entry.scene) if entry.sensors else None
         if table is not None:
             yield Question(make_case(entry.scene, entry.condition, renderer, coarse or {}, sensors=table))
         for view in entry.views:
             yield Question(make_case(entry.scene, entry.condition, renderer, coarse or {}, view=view))
+
+
+def chosen_visibilities(entry: SuiteCase, visibilities: tuple[str, ...]) -> tuple[str, ...]:
+    """All visibility methods for the default method; the published one has shadow volumes alone."""
+    return visibilities if entry.method == DEFAULT_METHOD else (COARSE_VISIBILITY,)
+
+
+def method_options(entry: SuiteCase, visibility: str | None = None) -> dict[str, Any]:
+    """Options of the engine for a case of a suite: its method where it is not the default, and how beams are found."""
+    options: dict[str, Any] = {} if entry.method == DEFAULT_METHOD else {"method": entry.method}
+    return options if visibility is None else {**options, "visibility": visibility}
 
 
 def coarse_options(renderer: Renderer) -> dict[str, Any] | None:

@@ -67,7 +67,8 @@ def write_sensors(path: Path, table: SensorTable) -> None:
 def read_sensors(path: Path) -> SensorTable:
     """Reads a table with or without set names and values. Normals are normalised.
 
-    Raises InputError for a missing file, missing or unknown columns, a cell that is no finite number, or a zero normal.
+    Values may be NaN or infinite: comparing tells whose fault that is. Raises InputError for a missing file, missing or
+    unknown columns, a cell that is no number, a place or normal that is not finite, or a normal of no length.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -97,7 +98,7 @@ def read_sensors(path: Path) -> SensorTable:
         cells = dict(zip(header, row, strict=True))
         sets.append(cells.get("set", "").strip())
         for name, column in numbers.items():
-            column[index] = _number(cells[name], path, f"{place}, {name}")
+            column[index] = _number(cells[name], path, f"{place}, {name}", measured=name in VALUE_COLUMNS)
     points = np.stack([numbers[name] for name in "xyz"], axis=1)
     normals = np.stack([numbers[name] for name in ("nx", "ny", "nz")], axis=1)
     lengths = np.linalg.norm(normals, axis=1)
@@ -116,11 +117,11 @@ def _joined(sets: Sequence[SensorSet]) -> SensorTable:
     return SensorTable(names, points, normals)
 
 
-def _number(cell: str, path: Path, place: str) -> float:
+def _number(cell: str, path: Path, place: str, *, measured: bool) -> float:
     try:
         value = float(cell)
     except ValueError as error:
         raise InputError("is not a number", file=path, field=place, value=cell.strip()) from error
-    if not math.isfinite(value):
+    if not (measured or math.isfinite(value)):
         raise InputError("is not finite", file=path, field=place, value=cell.strip())
     return value

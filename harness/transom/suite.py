@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from transom.daylight.condition import Condition, resolve_condition
 from transom.errors import InputError
@@ -35,7 +35,9 @@ class SuiteEntry(BaseModel):
 
     width: pictures are this wide and keep their view's proportions; omitted: the view's own size.
     reference: who knows the truth. layout: how a report shows it, view by view or as a grid of hours.
-    report: whether the report runs it.
+    report: whether the report runs it. known: cases with a known answer that are drawn in code (transom.known.suite),
+    or groups of hard cases (transom.hard_cases).
+    programs: renderers that a suite of known answers judges. method: how the engine finds light.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
@@ -44,10 +46,19 @@ class SuiteEntry(BaseModel):
     description: str = ""
     target_percent: float = Field(default=1.0, gt=0.0)
     width: int | None = Field(default=None, gt=0)
-    reference: Literal["mitsuba", "closed_form"] = "mitsuba"
+    reference: Literal["mitsuba", "closed_form", "crosscheck", "hard"] = "mitsuba"
     layout: Literal["views", "hours"] = "views"
     report: bool = True
-    cases: list[CaseEntry] = Field(min_length=1)
+    known: list[str] = []
+    programs: list[str] = ["engine"]
+    method: Literal["gather", "classic"] = "gather"
+    cases: list[CaseEntry] = []
+
+    @model_validator(mode="after")
+    def _holds_something(self) -> SuiteEntry:
+        if not self.cases and not self.known:
+            raise ValueError("a suite needs cases, or known ones")
+        return self
 
 
 class SuiteFile(BaseModel):
@@ -61,12 +72,14 @@ class SuiteFile(BaseModel):
 
 @dataclass(frozen=True)
 class SuiteCase:
-    """One scene in one condition: the views to render, at their final size, and whether to measure the sensors."""
+    """One scene in one condition: the views to render, at their final size, whether to measure the sensors, and the
+    engine's method."""
 
     scene: Scene
     condition: Condition
     views: tuple[View, ...]
     sensors: bool
+    method: str = "gather"
 
 
 @dataclass(frozen=True)
@@ -80,6 +93,8 @@ class Suite:
     reference: str
     layout: str
     cases: tuple[SuiteCase, ...]
+    known: tuple[str, ...] = ()
+    programs: tuple[str, ...] = ("engine",)
 
 
 def suites_file() -> Path:
@@ -105,9 +120,17 @@ def load_suite(name: str, path: Path | None = None) -> Suite:
     if name not in suites:
         raise InputError("is not a suite", field="SUITE", value=name, remedy=f"Choose one of {', '.join(suites)}")
     entry = suites[name]
-    cases = [case for line in entry.cases for case in _cases(line, entry.width)]
+    cases = [case for line in entry.cases for case in _cases(line, entry.width, entry.method)]
     return Suite(
-        name, entry.title, entry.description, entry.target_percent, entry.reference, entry.layout, tuple(cases)
+        name,
+        entry.title,
+        entry.description,
+        entry.target_percent,
+        entry.reference,
+        entry.layout,
+        tuple(cases),
+        tuple(entry.known),
+        tuple(entry.programs),
     )
 
 
@@ -143,11 +166,11 @@ def invalid_field(error: ValidationError, path: Path) -> InputError:
     return InputError(f"is refused: {first['msg']}", file=path, field=place or "file", value=value)
 
 
-def _cases(line: CaseEntry, width: int | None) -> list[SuiteCase]:
+def _cases(line: CaseEntry, width: int | None, method: str) -> list[SuiteCase]:
     scene = load_scene(line.scene)
     views = choose(scene.views, line.views, scene, "view")
     if width is not None:
         views = tuple(resized(view, width) for view in views)
     specs = choose(scene.conditions, line.conditions, scene, "condition")
     measured = line.sensors and bool(scene.sensors)
-    return [SuiteCase(scene, resolve_condition(spec, scene.site), views, measured) for spec in specs]
+    return [SuiteCase(scene, resolve_condition(spec, scene.site), views, measured, method) for spec in specs]

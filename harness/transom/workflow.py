@@ -15,21 +15,32 @@ from transom.claims import CaseBusyError
 from transom.compare import CaseNames, ImageComparison, SensorComparison, compare_images, compare_sensors
 from transom.comparison import (
     COMPARISON_FORMAT,
-    AnalyticComparison,
     Comparison,
     MethodAgreement,
     compare_methods,
     read_comparison,
     write_comparison,
 )
+from transom.crosscheck import compare_references, render_references
 from transom.errors import InputError, StorageError
 from transom.failures import error_words, read_failure
 from transom.files import write_atomic
+from transom.hard_cases import compare_hard_cases
 from transom.judge import Missing, Outcome, Verdict, exit_code, judge, read_tolerances
-from transom.known_answers import compare_known_answer
+from transom.known.suite import compare_known, program_table
 from transom.progress import CaseProgress
 from transom.renderer import ImageResult, Renderer, load_renderer
-from transom.run import COARSE_VISIBILITY, Question, coarse_options, engine_questions, free_first, render_case
+from transom.run import (
+    COARSE_VISIBILITY,
+    DEFAULT_METHOD,
+    Question,
+    chosen_visibilities,
+    coarse_options,
+    engine_questions,
+    free_first,
+    method_options,
+    render_case,
+)
 from transom.scene import scene_root
 from transom.scene.model import View
 from transom.sensor_file import SensorTable, scene_sensors
@@ -37,6 +48,8 @@ from transom.suite import Suite, SuiteCase, load_suite
 from transom.visible import region_masks
 
 VISIBILITIES = ("volumes", "rays")
+DRAWN_IN_CODE = ("closed_form", "hard")
+"""Suites whose cases are rendered while they are compared."""
 ENGINE = "engine"
 
 LOG_WIDTH = 160
@@ -65,22 +78,27 @@ def run_suite(name: str, scenes: Collection[str], build: Path = Path("build"), *
     compare_suite(suite, build, render_suite(suite, fresh=fresh))
     verdicts = judge_compared(name, build)
     print_verdicts(verdicts)
+    if suite.reference == "closed_form":
+        _console().print(program_table(verdicts))
     return exit_code(verdicts)
 
 
 def chosen(suite: Suite, scenes: Collection[str]) -> Suite:
     """The suite's cases of some scenes (none given: all). Raises InputError when none is left."""
     cases = tuple(case for case in suite.cases if not scenes or case.scene.name in scenes)
-    if not cases:
+    known = tuple(name for name in suite.known if not scenes or name in scenes)
+    if not cases and not known:
         raise InputError(f"is no scene of suite {suite.name}", field="--scene", value=", ".join(sorted(scenes)))
-    return replace(suite, cases=cases)
+    return replace(suite, cases=cases, known=known)
 
 
 def render_suite(suite: Suite, *, fresh: bool = False) -> list[Crash]:
     """Renders with the engine what is not there yet. A case that fails does not stop the others; a disk that takes no
     more files does (StorageError)."""
-    if suite.reference == "closed_form":
+    if suite.reference in DRAWN_IN_CODE:
         return []
+    if suite.reference == "crosscheck":
+        return [Crash(question, message) for question, message in render_references(suite, fresh=fresh)]
     renderer = load_renderer(ENGINE)
     return render_questions(renderer, list(engine_questions(suite, renderer, VISIBILITIES)), suite.name, fresh=fresh)
 
@@ -124,19 +142,24 @@ def compare_finished(name: str, build: Path) -> Comparison:
 
 def stored_failures(suite: Suite) -> list[Crash]:
     """The cases of a suite that failed when they were last rendered, as their failure bundles say."""
-    if suite.reference == "closed_form":
+    if suite.reference != "mitsuba":
         return []
     questions = engine_questions(suite, load_renderer(ENGINE), VISIBILITIES)
     found = ((question, read_failure(question.case)) for question in questions)
     return [Crash(question, failure.error) for question, failure in found if failure is not None]
 
 
-def compare_suite(suite: Suite, build: Path, crashes: Collection[Crash]) -> Comparison:
-    """Compares every case with its reference and writes comparison.json."""
+def compare_suite(suite: Suite, build: Path, crashes: Collection[Crash], engine: Renderer | None = None) -> Comparison:
+    """Compares every case with its reference and writes comparison.json. engine: another than the engine itself."""
     if suite.reference == "closed_form":
-        comparison = _compare_with_truth(suite)
+        comparison = compare_known(suite)
+    elif suite.reference == "crosscheck":
+        comparison = compare_references(suite, {crash.question.case.key: crash.message for crash in crashes})
+    elif suite.reference == "hard":
+        comparison = compare_hard_cases(suite)
     else:
-        comparison = _compare_with_mitsuba(suite, {crash.question.case.key: crash.message for crash in crashes})
+        failed = {crash.question.case.key: crash.message for crash in crashes}
+        comparison = _compare_with_mitsuba(suite, failed, engine or load_renderer(ENGINE))
     write_comparison(comparison_file(suite.name, build), comparison)
     return comparison
 
@@ -161,12 +184,16 @@ def print_verdicts(verdicts: Collection[Verdict]) -> None:
         numbers = (verdict.difference, verdict.numerical_bias, verdict.expanded_uncertainty, verdict.tolerance)
         cells = ["" if number is None else f"{number:.3g}" for number in numbers]
         table.add_row(verdict.outcome, verdict.quantity or verdict.reason, case, *cells)
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=LOG_WIDTH)
+    console = _console()
     console.print(table)
     counts = {outcome: sum(verdict.outcome is outcome for verdict in verdicts) for outcome in Outcome}
     console.print(", ".join(f"{count} {outcome}" for outcome, count in counts.items() if count) or "nothing judged")
+
+
+def _console() -> Console:
+    """Standard output; tables that go to a file have room."""
+    console = Console()
+    return console if console.is_terminal else Console(width=LOG_WIDTH)
 
 
 @dataclass
@@ -179,22 +206,8 @@ class _Found:
     missing: list[Missing]
 
 
-def _compare_with_truth(suite: Suite) -> Comparison:
-    """Scenes with a known answer; one that fails does not stop the others."""
-    renderer = load_renderer(ENGINE)
-    rows: list[AnalyticComparison] = []
-    missing: list[Missing] = []
-    for entry in suite.cases:
-        try:
-            rows += compare_known_answer(entry, renderer)
-        except Exception as error:
-            place = (entry.scene.name, "", entry.condition.name, "")
-            missing.append(Missing(Outcome.CRASHED, *place, error_words(error)))
-    return Comparison(COMPARISON_FORMAT, suite.name, suite.title, analytic=tuple(rows), missing=tuple(missing))
-
-
-def _compare_with_mitsuba(suite: Suite, crashed: Mapping[str, str]) -> Comparison:
-    engine, mitsuba = load_renderer(ENGINE), load_renderer("mitsuba")
+def _compare_with_mitsuba(suite: Suite, crashed: Mapping[str, str], engine: Renderer) -> Comparison:
+    mitsuba = load_renderer("mitsuba")
     found = _Found([], [], [], [])
     for entry in suite.cases:
         if entry.sensors:
@@ -220,12 +233,13 @@ def _compare_view(
     if truth is None:
         found.missing.append(_no_reference(entry, view.name))
     rendered: dict[str, Bundle] = {}
-    for visibility in VISIBILITIES:
-        case = make_case(scene, condition, engine, {"visibility": visibility}, view=view)
+    for visibility in chosen_visibilities(entry, VISIBILITIES):
+        case = make_case(scene, condition, engine, method_options(entry, visibility), view=view)
         ours = find_bundle(case)
         if ours is None or case.key in crashed:
             message = crashed.get(case.key, "not rendered: transom run")
-            found.missing.append(Missing(Outcome.CRASHED, scene.name, view.name, condition.name, visibility, message))
+            method = method_words(entry, visibility)
+            found.missing.append(Missing(Outcome.CRASHED, scene.name, view.name, condition.name, method, message))
             continue
         rendered[visibility] = ours
     pictures = {visibility: bundle.image() for visibility, bundle in rendered.items()}
@@ -234,7 +248,7 @@ def _compare_view(
         reference = truth.image()
         coarse = _coarse(entry, engine, view=view)
         for visibility, bundle in rendered.items():
-            names = _names(entry, view.name, visibility, bundle, truth)
+            names = _names(entry, view.name, method_words(entry, visibility), bundle, truth)
             rough = None
             if coarse is not None and COARSE_VISIBILITY in pictures:
                 rough = change_of_method(coarse.image(), pictures[COARSE_VISIBILITY], pictures[visibility])
@@ -249,7 +263,7 @@ def _compare_sensors(
 ) -> None:
     scene, condition = entry.scene, entry.condition
     table = scene_sensors(scene)
-    case = make_case(scene, condition, engine, {}, sensors=table)
+    case = make_case(scene, condition, engine, method_options(entry), sensors=table)
     ours, truth = find_bundle(case), find_bundle(make_case(scene, condition, mitsuba, {}, sensors=table))
     if truth is None:
         found.missing.append(_no_reference(entry, "sensors"))
@@ -257,10 +271,15 @@ def _compare_sensors(
         message = crashed.get(case.key, "not measured: transom run")
         found.missing.append(Missing(Outcome.CRASHED, scene.name, "sensors", condition.name, ENGINE, message))
     elif truth is not None:
-        names = _names(entry, "", "rays", ours, truth)
+        names = _names(entry, "", method_words(entry, "rays"), ours, truth)
         coarse = _coarse(entry, engine, sensors=table)
         rough = None if coarse is None else coarse.sensors()
         found.sensors += compare_sensors(ours.sensors(), truth.sensors(), names, rough)
+
+
+def method_words(entry: SuiteCase, visibility: str) -> str:
+    """How rows name what made a picture: the visibility method, or the engine's method where it is not the default."""
+    return visibility if entry.method == DEFAULT_METHOD else entry.method
 
 
 def change_of_method(coarse: ImageResult, usual: ImageResult, ours: ImageResult) -> ImageResult:
@@ -274,7 +293,7 @@ def _coarse(
 ) -> Bundle | None:
     """The engine's answer from half as many patches, where it was rendered."""
     options = coarse_options(engine)
-    if options is None:
+    if options is None or entry.method != DEFAULT_METHOD:
         return None
     return find_bundle(make_case(entry.scene, entry.condition, engine, options, view=view, sensors=sensors))
 

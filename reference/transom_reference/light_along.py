@@ -59,13 +59,20 @@ class LightAlong:
 
     def transmittance(self, opening: Any, cosine: Any, active: Any) -> Any:
         """Directional transmittance of an opening, linear between the table's entries."""
+        return self._of_angle(self.scene.glass_table, opening, cosine, active)
+
+    def mirror(self, opening: Any, cosine: Any, active: Any) -> Any:
+        """Directional reflectance of an opening's room side; for scenes that have a mirror_table."""
+        return self._of_angle(self.scene.mirror_table, opening, cosine, active)
+
+    def _of_angle(self, table: Any, opening: Any, cosine: Any, active: Any) -> Any:
         if not self.scene.portals:
             return mi.Float(1.0)
         position = dr.clip(cosine, 0.0, 1.0) * TABLE_INTERVALS
         entry = dr.minimum(mi.UInt32(position), TABLE_INTERVALS - 1)
         row = opening * (TABLE_INTERVALS + 1) + entry
-        low = dr.gather(mi.Float, self.scene.glass_table, row, active)
-        high = dr.gather(mi.Float, self.scene.glass_table, row + 1, active)
+        low = dr.gather(mi.Float, table, row, active)
+        high = dr.gather(mi.Float, table, row + 1, active)
         return dr.lerp(low, high, position - mi.Float(entry))
 
     def _panes(
@@ -93,7 +100,7 @@ class LightAlong:
             along = dr.dot(last_row.xyz, direction)
             opening = mi.UInt32(last_row.w)
             share = self.transmittance(opening, dr.abs(along), hit)
-            room = dr.select(along > 0.0, self._room_reflectance(opening, hit), 0.0)
+            room = dr.select(along > 0.0, self._room_reflectance(opening, along, hit), 0.0)
             passing = dr.select(room > 0.0, share / (share + room), 1.0)
             point = origin + found.t * direction
             if viewer is not None:
@@ -130,7 +137,9 @@ class LightAlong:
         state = dr.while_loop(state, lambda active, *_: active, body, label="panes")
         return state[4], state[5], state[6]
 
-    def _room_reflectance(self, opening: Any, active: Any) -> Any:
+    def _room_reflectance(self, opening: Any, cosine: Any, active: Any) -> Any:
+        if self.scene.mirror_table is not None:
+            return self.mirror(opening, cosine, active)
         return dr.gather(mi.Float, self.scene.room_reflectance, opening, active)
 
     def _clear(self, origin: Any, direction: Any, length: Any, active: Any) -> Any:

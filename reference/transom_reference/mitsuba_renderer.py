@@ -46,7 +46,8 @@ class MitsubaRenderer:
         """samples: paths a pixel in one batch, a power of two (1..4096); sensors use 64 paths in each of many lanes.
 
         batches: independent estimates, at least 2; published references have 32 or more. seed: any integer.
-        max_depth: surfaces and panes a path may meet. physics: "matched" (hard sun, diffuse room side of glass).
+        max_depth: surfaces and panes a path may meet. physics: "matched" (hard sun, diffuse room side of glass)
+        or "full" (sun's disc of 0.533 degrees, the room side of glass a mirror).
         """
         return {"samples": 64, "batches": 32, "seed": 1, "max_depth": 512, "physics": "matched"}
 
@@ -65,7 +66,7 @@ class MitsubaRenderer:
         batches: finished batches are loaded from here and new ones saved. Raises InputError for options out of range.
         """
         settings = self._settings(options)
-        transport = build_transport_scene(scene, condition)
+        transport = build_transport_scene(scene, condition, full_physics=settings["physics"] == "full")
         path = PathOptions(_log2(settings["samples"]), settings["max_depth"])
         integrator = PortalIntegrator(transport, camera_rays(view), path)
 
@@ -97,7 +98,7 @@ class MitsubaRenderer:
         points, normals = np.asarray(points, dtype=np.float64), np.asarray(normals, dtype=np.float64)
         if points.ndim != 2 or points.shape[1:] != (3,) or points.shape != normals.shape or len(points) == 0:
             raise InputError("must both have the same shape (N, 3), N >= 1", field="points, normals")
-        transport = build_transport_scene(scene, condition)
+        transport = build_transport_scene(scene, condition, full_physics=settings["physics"] == "full")
         replicas = int(np.clip(SENSOR_LANES_PER_BATCH // len(points), 1, 1024))
         start = SensorPoints(points, normals, replicas)
         path = PathOptions(SENSOR_LOG2_SAMPLES, settings["max_depth"])
@@ -122,8 +123,9 @@ class MitsubaRenderer:
             raise InputError("is less than 2: no standard error", field="batches", value=settings["batches"])
         if settings["max_depth"] < 1:
             raise InputError("is less than 1", field="max_depth", value=settings["max_depth"])
-        if settings["physics"] != "matched":
-            raise InputError("is not known", field="physics", value=settings["physics"], remedy='Use "matched"')
+        if settings["physics"] not in ("matched", "full"):
+            remedy = 'Use "matched" or "full"'
+            raise InputError("is not known", field="physics", value=settings["physics"], remedy=remedy)
         return settings
 
     def _facts(self, settings: Mapping[str, Any], transport: TransportScene, summary: _Summary) -> dict[str, Any]:

@@ -12,8 +12,10 @@ surfaces is divided between light vertices and rays by a weight that depends on 
 p / (c + p) with p the density of the cosine-distributed ray: any such division is unbiased, and it bounds connections.
 
 Glass multiplies by its angular transmittance, both ways. Its room side (the back of the face) also reflects diffusely:
-a path is reflected with probability R / (T + R). Smooth surfaces use the interpolated normal for the cosine of arriving
-light, and only light from the viewer's side of the true surface counts. Emitting surfaces are found by rays alone.
+a path is reflected with probability R / (T + R). In full physics the room side is a mirror: what a path meets after it
+is found by that ray alone, as from a camera, the sun's disc included, and light vertices are not used.
+Smooth surfaces use the interpolated normal for the cosine of arriving light, and only light from the viewer's side of
+the true surface counts. Emitting surfaces are found by rays alone.
 """
 
 from __future__ import annotations
@@ -30,11 +32,14 @@ from transom_reference.low_discrepancy import lane_seed, pair
 from transom_reference.mitsuba_setup import dr, floats, mi
 from transom_reference.path_starts import GivenRays, SensorPoints, Start, indoors
 from transom_reference.resampling import resample
-from transom_reference.sun_patches import SunPatches, pilot_multiplicity
+from transom_reference.sun_patches import SunPatches, pilot_multiplicity, sun_disc_direction
 from transom_reference.surface import offset, surface_at
 from transom_reference.transport_scene import TransportScene
 
 INVERSE_PI = float(1.0 / np.pi)
+SUN_DIMENSION = 1 << 16
+"""Pair number of the place on the sun's disc at step 0: beyond those of all other choices."""
+
 DIMENSION_PAIRS = 6
 """Pairs of numbers that one step of a path uses."""
 
@@ -91,7 +96,8 @@ class PortalIntegrator:
         self.connection_density = 0.0
         self.indoors: NDArray[np.bool_] | None = None
         lights_inside = scene.has_emitters or scene.point_source_count > 0
-        if options.connect and scene.portals and not lights_inside and not isinstance(start, GivenRays):
+        may_connect = options.connect and scene.mirror_table is None
+        if may_connect and scene.portals and not lights_inside and not isinstance(start, GivenRays):
             self.indoors = indoors(scene, start)
             if self.indoors.any():
                 self.connection_density = connection_density(scene, self.light, self._arriving(None))
@@ -210,6 +216,9 @@ class _Paths:
         escaped = ray_active & ~hit
         share = ray_density / (ray_density + portal_density)
         total = total + dr.select(escaped, throughput * light.beyond(direction, escaped) * share, 0.0)
+        if scene.mirror_table is not None and self.sun is not None:
+            # A ray that a mirror has turned, or the camera's own: no vertex has looked for the sun along it.
+            total = total + dr.select(escaped & ~after_vertex & (step > 0), throughput * self._disc(direction), 0.0)
 
         surface = surface_at(scene, found, direction, hit)
         point, normal, shading, reflectance = surface.point, surface.normal, surface.shading, surface.reflectance
@@ -218,7 +227,7 @@ class _Paths:
         # Glass: through, or a diffuse reflection at the room side
         choice, roulette = self._numbers(step, 0, sample)
         passed = light.transmittance(mi.UInt32(dr.maximum(surface.opening, 0.0)), dr.abs(surface.along), is_glass)
-        room = dr.select(surface.along > 0.0, surface.room, 0.0)
+        room = dr.select(surface.along > 0.0, self._room(surface, is_glass), 0.0)
         through_probability = dr.select(room > 0.0, passed / (passed + room), 1.0)
         through = is_glass & (choice < through_probability)
         reflected = is_glass & ~through
@@ -228,10 +237,15 @@ class _Paths:
         throughput = dr.select(through, throughput * passed / through_probability, throughput)
         throughput = dr.select(reflected, throughput / (1.0 - through_probability), throughput)
         ray_density = dr.select(through, ray_density * through_probability, ray_density)
-        reflectance = dr.select(reflected, mi.Color3f(room), reflectance)
         inside &= ~through
+        mirrored = mi.Bool(False)
+        if scene.mirror_table is None:
+            reflectance = dr.select(reflected, mi.Color3f(room), reflectance)
+        else:
+            mirrored = reflected
+            throughput = dr.select(reflected, throughput * room, throughput)
 
-        vertex = hit & ~through
+        vertex = hit & ~through & ~mirrored
         if scene.has_emitters:
             total = total + dr.select(vertex & ~is_glass, throughput * surface.emitted, 0.0)
         if sensors is not None:
@@ -280,8 +294,22 @@ class _Paths:
         last_normal = dr.select(vertex, shading, last_normal)
         last_weight = dr.select(vertex, weight, last_weight)
 
+        if scene.mirror_table is not None:
+            # As from a camera: nothing has been sampled along a mirrored ray.
+            direction = dr.select(mirrored, direction - 2.0 * dr.dot(direction, normal) * normal, direction)
+            ray_density, portal_density = (
+                dr.select(mirrored, 1.0, ray_density),
+                dr.select(mirrored, 0.0, portal_density),
+            )
+            last_normal, last_weight = (
+                dr.select(mirrored, mi.Normal3f(0.0), last_normal),
+                dr.select(mirrored, 0.0, last_weight),
+            )
+
         step = step + 1
-        going = ((vertex & survives) | through) & (step < self.options.max_depth) & (dr.max(throughput) > 0.0)
+        going = (
+            ((vertex & survives) | through | mirrored) & (step < self.options.max_depth) & (dr.max(throughput) > 0.0)
+        )
         sample = dr.select(going, sample, sample + 1)
         active = active & (sample < (1 << self.options.log2_samples))
         return (
@@ -300,11 +328,28 @@ class _Paths:
             total,
         )
 
+    def _room(self, surface: Any, active: Any) -> Any:
+        """Reflectance of the room side of a pane: hemispherical, or that of the angle where it is a mirror."""
+        if self.scene.mirror_table is None:
+            return surface.room
+        return self.light.mirror(mi.UInt32(dr.maximum(surface.opening, 0.0)), dr.abs(surface.along), active)
+
+    def _disc(self, direction: Any) -> Any:
+        """Radiance of the sun's disc in a direction, 0 beside it."""
+        radius = self.scene.sun_radius_rad
+        # The chord is exact in float32 where the cosine is not.
+        inside = dr.squared_norm(direction - self.sun) < (2.0 * float(np.sin(0.5 * radius))) ** 2
+        return dr.select(inside, self.sun_illuminance * float(1.0 / (np.pi * np.sin(radius) ** 2)), 0.0)
+
     def _sun_here(self, here: Vertex, arrival: Any, may_be_connected: Any) -> Any:
         """Direct sun; with the ray's share by the balance heuristic where a connection could have brought it."""
-        cosine, true_cosine = dr.dot(here.shading, self.sun), dr.dot(here.normal, self.sun)
+        sun = self.sun
+        if self.scene.sun_radius_rad > 0.0:
+            numbers = pair(self.seed, mi.UInt32(SUN_DIMENSION) + here.step, here.sample, self.options.log2_samples)
+            sun = sun_disc_direction(self.scene, *numbers)
+        cosine, true_cosine = dr.dot(here.shading, sun), dr.dot(here.normal, sun)
         lit = here.active & (cosine > 0.0) & (true_cosine > 0.0)
-        passed, density = self.light.sun(here.outside, self.sun, lit)
+        passed, density = self.light.sun(here.outside, sun, lit)
         share = mi.Float(1.0)
         if self.batch.patches is not None:
             connection = self.batch.patches.multiplicity * density * true_cosine

@@ -71,11 +71,26 @@ def _lit_points(scene: TransportScene, light: LightAlong, seed: int) -> tuple[An
     sun = mi.Vector3f(*map(float, scene.sun_direction))
     colour = mi.Color3f(*map(float, scene.sun_illuminance))
     dr.make_opaque(sun, colour)
+    if scene.sun_radius_rad > 0.0:
+        generator = np.random.default_rng([seed & 0xFFFFFFFF, 0x5D15C])
+        sun = sun_disc_direction(scene, floats(generator.random(POINT_COUNT)), floats(generator.random(POINT_COUNT)))
     rows = _light(scene, light, mi.Point3f(*points(start)), sun, colour)
     dr.eval(rows)
     table = np.stack([np.array(part) for part in rows], axis=1)
     table = table[table[:, 8:11].sum(axis=1) > 0]
     return floats(table), len(table)
+
+
+def sun_disc_direction(scene: TransportScene, u: Any, v: Any) -> Any:
+    """Direction towards a point of the sun's disc for two numbers in 0..1, uniform in solid angle.
+
+    1 - cos is computed as it is, since it is of the size of float32's rounding.
+    """
+    assert scene.sun_direction is not None
+    cap = 2.0 * float(np.sin(0.5 * scene.sun_radius_rad)) ** 2 * u
+    sine = dr.sqrt(cap * (2.0 - cap))
+    local = mi.Vector3f(sine * dr.cos(2 * np.pi * v), sine * dr.sin(2 * np.pi * v), 1.0 - cap)
+    return dr.normalize(mi.Frame3f(mi.Vector3f(*map(float, scene.sun_direction))).to_world(local))
 
 
 def portal_starts(scene: TransportScene, probability: Any, count: int, seed: int) -> tuple[Any, Any]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from transom.colour import luminance
 from transom.daylight.condition import Condition
-from transom.glass import diffuse_reflectance, transmittance_table
+from transom.glass import diffuse_reflectance, pane, transmittance_table
 from transom.scene.model import Mesh, Scene
 from transom_reference.mitsuba_setup import dr, floats, mi
 
@@ -19,6 +19,9 @@ Int32 = NDArray[np.int32]
 
 SKY_ROWS = 512
 """Rows of the sky table from zenith to horizon; four times as many columns. Interpolation error below 1e-4."""
+
+SUN_RADIUS_RAD = float(np.radians(0.533 / 2))
+"""Mean apparent radius of the sun's disc, as Radiance has it."""
 
 TABLE_INTERVALS = 1024
 """Intervals of the glass table: entry i is the transmittance at cos(theta) = i / 1024."""
@@ -63,7 +66,9 @@ class TransportScene:
     all, opaque, glass: mi.Scene. triangles: flat (T, 12): v0, material; e1, smooth (0 or 1); e2, 0.
     normals: flat (T, 9), corner normals, or None. materials: flat (M, 8): reflectance rgb, opening
     (or -1); luminance rgb, room reflectance.
-    glass_table: flat (openings, 1025). room_reflectance: (openings,). portal_of_glass_triangle: UInt32; the glass
+    glass_table: flat (openings, 1025). room_reflectance: (openings,), diffuse. mirror_table: like glass_table, the
+    directional reflectance of the room side, or None where that reflects diffusely (matched physics). sun_radius_rad:
+    of the sun's disc, 0 for a point (matched physics). portal_of_glass_triangle: UInt32; the glass
     triangles are the last rows of `triangles`, after `opaque_count` others.
     portal_table: flat (P, 16): corner, area; edge_u, is_triangle; edge_v, weight; normal, opening.
     """
@@ -91,6 +96,8 @@ class TransportScene:
     point_sources: Any
     point_source_count: int
     has_emitters: bool
+    mirror_table: Any = None
+    sun_radius_rad: float = 0.0
 
 
 def find_portals(scene: Scene) -> tuple[Portal, ...]:
@@ -169,8 +176,11 @@ def _portal_weights(scene: Scene, condition: Condition, portals: tuple[Portal, .
     return np.array(weights)
 
 
-def build_transport_scene(scene: Scene, condition: Condition) -> TransportScene:
-    """Tables and ray-tracing scenes of a scene under a condition; float32, coordinates of the scene."""
+def build_transport_scene(scene: Scene, condition: Condition, *, full_physics: bool = False) -> TransportScene:
+    """Tables and ray-tracing scenes of a scene under a condition; float32, coordinates of the scene.
+
+    full_physics: the sun is a disc, and the room side of glass a mirror; else a point, and diffuse.
+    """
     mesh = scene.mesh
     rows, source = mesh.triangles()
     material = mesh.face_material[source]
@@ -236,9 +246,21 @@ def build_transport_scene(scene: Scene, condition: Condition) -> TransportScene:
         point_sources=floats(sources),
         point_source_count=len(sources),
         has_emitters=any(max(entry.luminance) > 0 for entry in scene.materials),
+        mirror_table=floats(_mirror_tables(scene)) if full_physics and scene.openings else None,
+        sun_radius_rad=SUN_RADIUS_RAD if full_physics else 0.0,
     )
     dr.make_opaque(result.ground, result.sky_rgb)
     return result
+
+
+def _mirror_tables(scene: Scene) -> NDArray[np.float64]:
+    """Directional reflectance of each opening at cos(theta) = i / 1024, (openings, 1025); 0 of an unglazed one."""
+    cosine = np.linspace(0.0, 1.0, TABLE_INTERVALS + 1)
+    tables = [
+        np.zeros_like(cosine) if entry.glazing == "none" else pane(entry.visible_transmittance, cosine)[1]
+        for entry in scene.openings
+    ]
+    return np.array(tables)
 
 
 def _triangle_normals(mesh: Mesh) -> Float64:

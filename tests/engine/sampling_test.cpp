@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include <numbers>
 #include <set>
 
@@ -71,6 +73,24 @@ TEST(SphericalTriangle, SamplesLieInsideAndHaveTheOctantsMean) {
 
 TEST(SphericalTriangle, DegenerateOneHasNoSolidAngle) {
   EXPECT_EQ(SphericalTriangle({1, 0, 0}, {1, 0, 0}, {0, 0, 1}).solid_angle(), 0);
+}
+
+TEST(Sampling, PacketsOfTheCoherentOrderStayTogetherUnderEverySeed) {
+  const std::vector<std::uint32_t>& order = coherent_order(1000);
+  ASSERT_EQ(order.size(), 1024u);
+  EXPECT_EQ(std::set<std::uint32_t>(order.begin(), order.end()).size(), 1024u);
+  for (const std::uint32_t seed : {1u, 77u, 123456u}) {
+    const SobolSequence points(seed);
+    for (std::size_t begin = 0; begin < order.size(); begin += 16) {
+      glm::vec2 low(1), high(0);
+      for (std::size_t i = begin; i < begin + 16; ++i) {
+        low = glm::min(low, points.point2(order[i]));
+        high = glm::max(high, points.point2(order[i]));
+      }
+      EXPECT_LT(high.x - low.x, 0.125f);
+      EXPECT_LT(high.y - low.y, 0.125f);
+    }
+  }
 }
 
 }  // namespace

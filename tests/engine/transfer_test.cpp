@@ -20,23 +20,12 @@ TEST(Transfer, NoisyFormFactorsBecomeReciprocalAndClosed) {
   EXPECT_LT(defects.reciprocity, 1e-6);
 }
 
-TEST(Transfer, ReflectanceActsBeforeTheOperatorAndNotAfter) {
-  // Two facing surfaces that see only each other: B1 = M1 + r1 E1, E1 = B2; B2 = r2 E2, E2 = B1.
-  SparseRows f = rows_of({{{1, 1.f}}, {{0, 1.f}}}), none = rows_of({{}, {}});
-  const std::vector<glm::vec3> rho{glm::vec3(0.2f), glm::vec3(0.8f)}, emitted{glm::vec3(100), glm::vec3(0)};
-  const std::vector<glm::vec3> direct{glm::vec3(0), glm::vec3(0)};
-  std::vector<glm::vec3> e = direct;
-  solve_interreflection(f, none, rho, emitted, direct, {1, 1}, 1e-9, 1000, e);
-  const double b1 = 100 / (1 - 0.2 * 0.8);
-  EXPECT_NEAR(e[1].x, b1, 1e-3);
-  EXPECT_NEAR(e[0].x, 0.8 * b1, 1e-3);
-}
-
-TEST(Transfer, ARoomThatLosesNothingIsRefused) {
-  SparseRows f = rows_of({{{1, 1.f}}, {{0, 1.f}}}), none = rows_of({{}, {}});
-  const std::vector<glm::vec3> white(2, glm::vec3(1)), light(2, glm::vec3(1)), dark(2, glm::vec3(0));
-  std::vector<glm::vec3> e = dark;
-  EXPECT_THROW(solve_interreflection(f, none, white, light, dark, {1, 1}, 1e-9, 50, e), std::runtime_error);
+TEST(Transfer, FourFloatsAreSummedAsOne) {
+  const SparseRows rows = rows_of({{{0, 0.5f}, {1, 2.f}, {2, -1.f}}, {}, {{2, 3.f}}});
+  const std::vector<glm::vec4> values{{1, 2, 3, 4}, {5, 6, 7, 8}, {9, 10, 11, 12}};
+  EXPECT_EQ(rows.dot(0, values), glm::vec4(1.5f, 3, 4.5f, 6));
+  EXPECT_EQ(rows.dot(1, values), glm::vec4(0));
+  EXPECT_EQ(rows.dot(2, values), glm::vec4(27, 30, 33, 36));
 }
 
 }  // namespace

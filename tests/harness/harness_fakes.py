@@ -130,29 +130,41 @@ def grey(values: NDArray[np.floating]) -> NDArray[np.float32]:
     return np.repeat(np.asarray(values, np.float32)[..., None], 3, axis=-1)
 
 
+CHEAP_FACTS = {"energy_imbalance": 1e-4, "sweeps": 12, "interior_patches": 300, "nodes": 900, "faces": 6}
+
+
 class CheapEngine:
     """Takes the engine's place: a level that depends on the scene's reflectance, and a note of every case it renders.
 
     $CHEAP_ENGINE_LOG: file to which each finished rendering adds a line; $CHEAP_ENGINE_SECONDS: how long one takes;
-    $CHEAP_ENGINE_FAILS: condition whose rendering raises an error.
+    $CHEAP_ENGINE_FAILS: condition whose rendering raises an error; $CHEAP_ENGINE_SKY, $CHEAP_ENGINE_INDIRECT: factors
+    on these components; $CHEAP_ENGINE_SPREAD: relative noise of a pixel, by seed.
     """
 
     name = "engine"
     version = "cheap-1"
 
     def default_options(self) -> dict[str, Any]:
-        return {"visibility": "rays", "seed": 1}
+        return {"visibility": "rays", "seed": 1, "sensor_rays": 16, "sensor_opening_rays": 16}
 
     def render(
         self,
         scene: Scene,
         condition: Condition,
         view: View,
-        options: Mapping[str, Any],  # noqa: ARG002
+        options: Mapping[str, Any],
         progress: Progress | None = None,  # noqa: ARG002
     ) -> ImageResult:
         level = self._level(scene, condition)
-        return ImageResult(np.full((view.height, view.width, 3), level, np.float32))
+        shape = (view.height, view.width, 3)
+        random = np.random.default_rng(int(options["seed"]))
+        spread = float(os.environ.get("CHEAP_ENGINE_SPREAD", "0"))
+        parts = {name: np.zeros(shape, np.float32) for name in ("sun", "emitted", "exterior")}
+        for name, share in (("sky", 0.4), ("indirect", 0.6)):
+            changed = float(os.environ.get(f"CHEAP_ENGINE_{name.upper()}", "1"))
+            noise = 1 + spread * random.standard_normal(shape[:2])
+            parts[name] = grey(level * share * changed * noise)
+        return ImageResult(sum(parts.values(), np.zeros(shape, np.float32)), components=parts, facts=CHEAP_FACTS)
 
     def illuminance(
         self,
@@ -163,7 +175,8 @@ class CheapEngine:
         options: Mapping[str, Any],  # noqa: ARG002
         progress: Progress | None = None,  # noqa: ARG002
     ) -> SensorResult:
-        return SensorResult(np.full((len(points), 3), self._level(scene, condition)), np.zeros(len(points)))
+        values = np.full((len(points), 3), self._level(scene, condition))
+        return SensorResult(values, np.zeros(len(points)), CHEAP_FACTS)
 
     def _level(self, scene: Scene, condition: Condition) -> float:
         time.sleep(float(os.environ.get("CHEAP_ENGINE_SECONDS", "0")))
@@ -173,4 +186,4 @@ class CheapEngine:
         if log is not None:
             with Path(log).open("a") as stream:
                 stream.write(f"{scene.name} {condition.name}\n")
-        return 100.0 * scene.materials[0].reflectance[0]
+        return 200.0 * scene.materials[0].reflectance[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -87,8 +88,10 @@ class FakeEngine:
         return SensorResult(np.full((len(points), 3), 100 * (1 + self.error)), np.zeros(len(points)))
 
 
-def make_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def make_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sky: str = "overcast") -> Path:
     """A project of one small scene, with fake renderers and timings."""
+    small = small_scene()
+    scene = replace(small, conditions=tuple(replace(spec, sky=sky) for spec in small.conditions))
     scenes = tmp_path / "scenes"
     scenes.mkdir()
     (scenes / "suites.toml").write_text(SUITES)
@@ -102,11 +105,11 @@ def make_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         return FirstSurfaces(np.where(interior, 0, -1).astype(np.int32), np.zeros((*shape, 3), np.float32), interior)
 
     monkeypatch.setattr("transom.bundle._engine_build", lambda: "fake")
-    monkeypatch.setattr("transom.suite.load_scene", lambda _: small_scene())
+    monkeypatch.setattr("transom.suite.load_scene", lambda _: scene)
     monkeypatch.setattr("transom.suite.scene_root", lambda: scenes)
     monkeypatch.setattr("transom.workflow.scene_root", lambda: scenes)
     monkeypatch.setattr("transom.report.build.scene_root", lambda: scenes)
-    monkeypatch.setattr("transom.report.speed.load_scene", lambda _: small_scene())
+    monkeypatch.setattr("transom.report.speed.load_scene", lambda _: scene)
     for module in ("workflow", "report.pictures", "report.day"):
         monkeypatch.setattr(f"transom.{module}.load_renderer", renderers.__getitem__)
     for module in ("run", "visible", "report.viewer"):

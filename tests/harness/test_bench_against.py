@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import subprocess
 from collections.abc import Sequence
@@ -12,7 +13,7 @@ from pathlib import Path
 import pytest
 from scene_writing import write_scene
 
-from transom import revisions
+from transom import bench_against, revisions
 from transom.bench_against import (
     GENERATION_ROUNDS,
     Measured,
@@ -23,6 +24,7 @@ from transom.bench_against import (
     write_comparison,
 )
 from transom.cli import WRONG_USE, run_command
+from transom.commands import tracing
 from transom.errors import InputError
 from transom.judge import Outcome, SpeedChange
 from transom.provenance import current_provenance
@@ -59,6 +61,22 @@ def test_every_round_times_each_build_once_in_an_order_of_its_own() -> None:
     assert all(sorted(entry) == ["base", "base again", "ours"] for entry in rounds)
     assert len({tuple(entry) for entry in rounds}) == 6
     assert result.times["solve"] == PairedTimes("solve", (1.0,) * 21, (1.01,) * 21, (2.0,) * 21)
+
+
+def test_repeats_take_turns_and_the_least_of_each_build_counts() -> None:
+    calls: list[str] = []
+
+    class Slowing(FakeWorker):
+        def times(self, request: Sequence[tuple[str, int]]) -> dict[str, float]:
+            self.seconds += 1.0
+            return super().times(request)
+
+    def start(_: ExitStack) -> tuple[Slowing, Slowing, Slowing]:
+        return Slowing("base", 0.0, calls), Slowing("base again", 0.0, calls), Slowing("ours", 4.0, calls)
+
+    result = measure(start, [("relight", 3)], 1, lambda *_: None, random.Random(3))
+    assert all(sorted(calls[3 * turn : 3 * turn + 3]) == ["base", "base again", "ours"] for turn in range(3))
+    assert result.times["relight"] == PairedTimes("relight", (1.0,), (1.0,), (5.0,))
 
 
 def test_processes_are_renewed_so_that_no_lucky_layout_decides() -> None:
@@ -112,6 +130,8 @@ def test_the_slower_phase_comes_first_in_the_table_and_sets_the_exit_code(tmp_pa
         (["--against", "--output"], ["--output"]),
         (["--against", "HEAD", "--of", "nothing"], ["--of", "nothing"]),
         (["--against", "HEAD", "--rounds", "10"], ["--rounds", "10", "odd"]),
+        (["--against", "HEAD", "--only", "paint"], ["--only", "paint", "relight"]),
+        (["--against", "HEAD", "-o", "a.txt"], ["a.txt", ".json"]),
     ],
 )
 def test_wrong_revisions_are_one_clear_line(
@@ -161,6 +181,43 @@ def test_a_worker_that_cannot_start_says_why(tmp_path: Path) -> None:
         pytest.raises(InputError, match="no_room"),
     ):
         worker.ready()
+
+
+@pytest.fixture
+def prebuilt(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every revision is the working tree as it is built: nothing is checked out and compiled."""
+    pytest.importorskip("transom._engine", reason="the engine is not built", exc_type=ImportError)
+    for module in (bench_against, revisions):
+        monkeypatch.setattr(module, "check_out", lambda *_: revisions.present_build().source)
+        monkeypatch.setattr(module, "build", lambda _, folder: folder.mkdir(parents=True) or revisions.present_build())
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("prebuilt")
+def test_a_build_against_itself_is_timed_judged_and_kept_whole(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, output = write_scene(tmp_path / "room"), tmp_path / "against.json"
+    arguments = ["--against", "HEAD", "--rounds", "9", "--patches", "200", "--only", "relight", "-o", str(output)]
+    code = run_command(["bench", str(folder), *arguments])
+    rows = json.loads(output.read_text())["rows"]
+    assert {"relight", "relight/gather", "relight/all threads"} <= {row["quantity"] for row in rows}
+    assert all(len(row["first_times"][side]) == 9 for row in rows for side in ("base_s", "control_s", "ours_s"))
+    assert code == (3 if any(row["outcome"] == "INCONCLUSIVE" for row in rows) else 0)
+    assert "relight/gather" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("prebuilt")
+def test_phases_of_two_revisions_stand_beside_each_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(tracing, "DIFF_ROUNDS", 2)
+    folder = write_scene(tmp_path / "room")
+    assert run_command(["trace", str(folder), "--diff", "HEAD~1", "HEAD"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:2] == ["A: HEAD~1", "B: HEAD"]
+    assert any(line.startswith("solve/nodes") for line in lines)
 
 
 def test_worktrees_and_builds_are_gone_afterwards() -> None:

@@ -31,7 +31,7 @@ from transom.errors import InputError
 from transom.judge import Outcome, ToleranceFile, judge
 from transom.noise import mean_relative_standard_error
 from transom.renderer import ImageResult
-from transom.sensor_file import SensorTable
+from transom.sensor_file import SensorTable, read_sensors, write_sensors
 from transom.visible import EXTERIOR, INTERIOR
 
 NAMES = CaseNames("room", "noon", "rays", "mitsuba", "view")
@@ -219,7 +219,10 @@ def noisy_with_groups(error: float = 0.02) -> tuple[ImageResult, ImageResult, Ca
 
 def test_few_groups_of_batches_are_said_so_that_students_quantile_is_theirs() -> None:
     engine, reference, names = noisy_with_groups()
-    assert compare_region(engine, reference, EVERYWHERE, "all", names).reference_group_count == 3
+    result = compare_region(engine, reference, EVERYWHERE, "all", names)
+    assert result.reference_group_count == 3
+    expected = 0.01 * smooth_truth().mean() / np.sqrt(3)
+    assert result.reference_mean_standard_error_cd_m2 == pytest.approx(expected), "spread of 1 %, by N - 1"
     without = dataclasses.replace(names, reference_means={})
     assert compare_region(engine, reference, EVERYWHERE, "all", without).reference_group_count == 2, "its two halves"
     exact = compare_region(engine, ImageResult(grey(smooth_truth())), EVERYWHERE, "all", NAMES)
@@ -368,3 +371,11 @@ def test_comparison_with_values_that_are_not_finite_is_written_and_read_back(tmp
     (subject,) = read_comparison(tmp_path / "c.json").subjects()
     assert np.isnan(subject.difference)
     assert subject.uncertainty == np.inf
+
+
+def test_sensor_file_keeps_values_that_are_not_finite_for_the_comparison_to_name(tmp_path: Path) -> None:
+    place = SensorTable(("desk",), np.zeros((1, 3)), np.array([[0, 0, 1.0]]))
+    write_sensors(tmp_path / "sensors.csv", place.measured(np.array([np.nan]), np.zeros(1)))
+    engine = read_sensors(tmp_path / "sensors.csv")
+    (row,) = compare_sensors(engine, place.measured(np.array([5.0]), np.array([0.1])), NAMES)
+    assert row.fault == "illuminance of the engine is nan"

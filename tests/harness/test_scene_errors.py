@@ -29,7 +29,7 @@ TOML_MISTAKES = {
     "switch": ("reflectance = 0.5", "reflectance = 0.5\nsmooth = 1", r"smooth = 1 is neither true nor false"),
     "unit": ('unit = "m"', 'unit = "yd"', r"mesh\.unit = 'yd' is not a unit of length .*\"m\", \"cm\", \"mm\", \"ft\", \"in\""),
     "axis": ('up = "z"', 'up = "x"', r"mesh\.up = 'x' is not an axis that can point up"),
-    "reflectance of 1": ("reflectance = 0.5", "reflectance = 1.0", r"reflectance = 1\.0 is outside 0\.\.1, 1 excluded"),
+    "reflectance of 1": ("reflectance = 0.5", "reflectance = 1.0", r"reflectance = 1\.0 is outside 0\.\.0\.999 \(diffuse"),
     "colour of two numbers": ("[0.3, 0.2, 0.1]", "[0.3, 0.2]", r"materials\.floor\.reflectance = \[0\.3, 0\.2\] is neither a number nor"),
     "material without reflectance": ("reflectance = 0.5", "smooth = true", r"materials\.wall\.reflectance is missing"),
     "glazing": ('glazing = "clear"', 'glazing = "double"', r"glazing = 'double' is not a kind of glazing\. Allowed: \"clear\", \"none\""),

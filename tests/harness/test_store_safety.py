@@ -173,7 +173,7 @@ def test_damaged_answer_is_rendered_again(damage: str) -> None:
         (folder / "run.json").write_text('{"format": 1')
     else:
         (folder / "image.exr").unlink()
-    assert render_case(CheapEngine(), question).image().mean[0, 0, 0] == 50.0
+    assert render_case(CheapEngine(), question).image().mean[0, 0, 0] == 100.0
 
 
 def test_failure_is_kept_with_what_shows_it_again_until_the_case_has_an_answer(

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from solved_scenes import solved
 
+from transom.bundle import Bundle
 from transom.colour import luminance
 from transom.daylight import resolve_condition
 from transom.engine import Engine
-from transom.known_answers import compare_known_answer
-from transom.renderer import load_renderer
+from transom.known.suite import answer, cases_of_scene, compare_bundle
 from transom.scene import load_scene
 from transom.suite import SuiteCase, load_suite
 
@@ -57,10 +57,13 @@ def test_cube_has_the_exact_mean_luminance() -> None:
 @pytest.mark.parametrize("entry", load_suite("analytic").cases, ids=lambda entry: entry.scene.name)
 def test_luminances_meet_the_known_answers(entry: SuiteCase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TRANSOM_CACHE", str(tmp_path))
-    rows = compare_known_answer(entry, load_renderer("engine"))
-    assert rows
-    for row in rows:
-        assert row.engine == pytest.approx(row.truth, rel=TOLERANCE[entry.scene.name]), row.quantity
+    for case in cases_of_scene(entry):
+        bundle = answer(case, "engine")
+        assert isinstance(bundle, Bundle), bundle
+        rows = compare_bundle(case, "engine", bundle)
+        assert rows
+        for row in rows:
+            assert row.value == pytest.approx(row.truth, rel=TOLERANCE[entry.scene.name]), row.quantity
 
 
 @pytest.mark.parametrize("reflectance", [0.0, 0.5, 0.8, 0.9])

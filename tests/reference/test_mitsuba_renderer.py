@@ -71,7 +71,7 @@ def test_standard_error_describes_the_spread_of_independent_runs() -> None:
 
 @pytest.mark.parametrize(
     ("options", "field"),
-    [({"samples": 48}, "samples"), ({"batches": 1}, "batches"), ({"physics": "full"}, "physics"), ({"spp": 4}, "spp")],
+    [({"samples": 48}, "samples"), ({"batches": 1}, "batches"), ({"physics": "real"}, "physics"), ({"spp": 4}, "spp")],
 )
 def test_wrong_option_is_named(options: dict[str, Any], field: str) -> None:
     with pytest.raises(InputError, match=field):

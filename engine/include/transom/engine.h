@@ -11,8 +11,10 @@
 #include "transom/first_bounce.h"
 #include "transom/gather.h"
 #include "transom/geometry.h"
+#include "transom/interreflection.h"
 #include "transom/light_mesh.h"
 #include "transom/node_field.h"
+#include "transom/point_links.h"
 #include "transom/ray_scene.h"
 #include "transom/sky.h"
 #include "transom/trace.h"
@@ -33,7 +35,7 @@ struct SolveOptions {
   GatherSamples patch_samples{512, 128};
   GatherSamples node_samples{1024, 256};
   float node_spacing = 6;   ///< of nodes, against the harmonic mean distance of what a cell sees
-  double tolerance = 1e-6;  ///< flux in flight at which interreflection stops, relative
+  double tolerance = 1e-4;  ///< flux in flight at which interreflection stops, relative
   std::uint32_t seed = 1;
   bool trace = false;
 };
@@ -44,6 +46,8 @@ struct SolveFacts {
   float maximum_edge_m = 0;
   double leak_share = 0;  ///< of the hemisphere rays of interior patches, those that met nothing
   TransferDefects defects;
+  int cluster_count = 0;       ///< of patches, for interreflection
+  std::size_t link_bytes = 0;  ///< of what is kept of how nodes see patches
 };
 
 /// Flux balance of the interior [lm], linear RGB. Interior: every side that light from the rooms' side of the openings,
@@ -71,13 +75,14 @@ struct Lighting {
   std::vector<glm::vec3> node_sky, node_indirect;  ///< irradiance of each node [lx]
   std::vector<glm::vec3> patch_irradiance;         ///< all light [lx]
   std::vector<glm::vec3> patch_smooth_radiosity;   ///< what nodes find by rays: M + rho (E - direct) [lm/m²]
-  std::vector<glm::vec3> element_direct;           ///< patch * elements_per_slot + element [lx]
-  std::vector<glm::vec3> patch_sky;                ///< kClassic: directly from sky and ground [lx]
-  std::vector<glm::vec3> patch_sun;                ///< kClassic: directly from beams and point sources [lx]
-  int sweeps = 0;
-  int shots = 0;              ///< kClassic: patches that have shot
-  double unshot_share = 0;    ///< kClassic: flux in flight, relative
-  int forward_ray_count = 0;  ///< kClassic
+  std::vector<LitElement> lit_elements;            ///< by beams and point sources
+  std::vector<BrightElement> bright_elements;      ///< what points are connected to
+  std::vector<glm::vec3> patch_sky;                ///< directly from sky and ground [lx]
+  std::vector<glm::vec3> patch_sun;                ///< directly from beams and point sources [lx]
+  int sweeps = 0;                                  ///< cycles of interreflection
+  int shots = 0;                                   ///< kClassic: patches that have shot
+  double unshot_share = 0;                         ///< kClassic: flux in flight, relative
+  int forward_ray_count = 0;                       ///< kClassic
 };
 
 class Engine {
@@ -96,9 +101,10 @@ class Engine {
   void begin_relight(Condition condition);
   bool continue_relight(int shots);
 
-  /// Irradiance at points (world coordinates [m]) with unit normals, under the present condition.
+  /// Irradiance at points (world coordinates [m]) with unit normals, under the present condition. What the last points
+  /// see is kept: asked again under another condition, they cost sums and connections to sunlit patches.
   std::vector<Irradiance> illuminance(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
-                                      GatherSamples samples) const;
+                                      GatherSamples samples);
 
   /// Flux balance under the present condition; `rays_per_opening` samples each opening triangle independently.
   EnergyAudit audit(int rays_per_opening) const;
@@ -116,15 +122,21 @@ class Engine {
   const DirectLight& direct_light() const { return *direct_light_; }
   glm::vec3 reflectance(int face, Side side) const;
 
-  /// Sky and indirect irradiance at a point of a face, between its nodes. Zero where the side takes no part.
-  Irradiance interpolate(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const;
+  /// What speaks for the light at a point of a face: nodes around it, or else its patch. Numbers are those of
+  /// `shown_radiance`. Empty where the side takes no part.
+  NodeShares shown_at(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const;
+
+  /// Radiance reflected by every node, then by every patch, of the present light of sky and of surfaces [cd/m²].
+  void shown_radiance(std::vector<glm::vec4>& sky, std::vector<glm::vec4>& indirect) const;
 
   const SparseRows& form_factors() const { return form_factors_; }
   const std::vector<float>& patch_areas() const { return patch_area_; }
   const std::vector<int>& patch_slots() const { return slot_of_patch_; }
 
  private:
-  void find_patches(const std::vector<int>& first_slots, std::vector<GatherRow>& rows);
+  std::vector<int> first_wave() const;
+  void find_patches(std::vector<int> wave, std::vector<GatherRow>& rows);
+  void find_unseen_patches(std::vector<GatherRow>& rows);
   std::vector<int> first_slots() const;
   void mark_interior(const std::vector<GatherRow>& rows);
   void check_closed(const std::vector<GatherRow>& rows);
@@ -135,8 +147,10 @@ class Engine {
   void show_classic();
   std::vector<Share> to_patches(const std::vector<Share>& elements) const;
   glm::vec3 sky_light(const SparseRows& rows, std::size_t row) const;
+  void light_always();
+  std::vector<int> beam_slots() const;
   std::vector<BrightElement> bright_elements(const std::vector<LitElement>& lit) const;
-  glm::vec3 element_radiosity(int element) const;
+  std::vector<glm::vec3> element_direct() const;
 
   SceneGeometry scene_;
   SolveOptions options_;
@@ -147,8 +161,7 @@ class Engine {
   std::unique_ptr<LightMesh> mesh_;
   std::unique_ptr<SkyBinIndex> sky_index_;
   std::unique_ptr<Gatherer> gatherer_;
-  std::unique_ptr<DirectLight> direct_light_;
-  std::unique_ptr<FirstBounce> first_bounce_;  // of the present condition
+  std::unique_ptr<DirectLight> direct_light_, beam_light_;  // with point sources and without
 
   // Patches: the slots that take part.
   std::vector<int> patch_of_slot_;  // -1: takes no part
@@ -156,12 +169,33 @@ class Engine {
   std::vector<float> patch_area_;  // exposed part [m²]
   std::vector<glm::vec3> patch_reflectance_, patch_emitted_;
   std::vector<char> is_interior_;
+  std::vector<int> unseen_slots_;   // that see patches indoors and were seen by none
   bool connects_emitters_ = false;  // small emitters: found by connection, not by rays
   SparseRows form_factors_, through_, patch_sky_;
+  std::unique_ptr<Interreflection> interreflection_;
 
   // Where light is shown.
   std::unique_ptr<NodeField> nodes_;
   SparseRows node_sky_, node_patches_;
+  std::unique_ptr<PointLinks> links_;
+
+  // Light that no condition changes: of point sources on elements, and its first reflection, with small emitters, at
+  // nodes.
+  std::vector<LitElement> lit_by_sources_;
+  std::vector<BrightElement> bright_always_;
+  std::vector<glm::vec3> node_always_;
+
+  // Points at which illuminance was asked for last.
+  struct Sensors {
+    std::vector<glm::dvec3> points;
+    std::vector<glm::vec3> normals;
+    GatherSamples samples;
+    std::vector<Node> nodes;
+    SparseRows sky, patches;
+  };
+  void gather_sensors(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
+                      GatherSamples samples);
+  Sensors sensors_;
 
   // kClassic alone.
   std::unique_ptr<ForwardRays> forward_rays_;

@@ -16,15 +16,32 @@ struct BrightElement {
   glm::vec3 radiosity;
 };
 
+/// An element as points see it.
+struct ElementShape {
+  glm::vec3 corner[4];  ///< counter-clockwise from the lit side
+  int corner_count;
+  glm::vec3 middle;  ///< lifted
+  float area;        ///< [m²]
+};
+ElementShape element_shape(const LightMesh& mesh, int element);
+
+/// Form factor from a point to an unoccluded element that faces `element_normal`: a closed form if it is adjacent,
+/// else as if all of it were at its middle.
+float element_share(glm::vec3 point, glm::vec3 normal, const ElementShape& shape, glm::vec3 element_normal);
+
 /// The bright elements of a condition, by patch, ready to be looked at from points.
 class FirstBounce {
  public:
   /// Elements of one slot stand together.
   FirstBounce(const LightMesh& mesh, const RayScene& rays, const std::vector<BrightElement>& bright);
 
-  /// Irradiance at a lifted point [lx]. A far patch counts as a point at the centroid of its light, a near one element
-  /// by element, an adjacent element by its closed form; each with one ray for what stands between.
-  glm::vec3 irradiance(glm::vec3 point, glm::vec3 normal) const;
+  /// How well it is known what stands between. kOne: a far patch counts as a point at the centroid of its light, a near
+  /// one element by element; each with one ray. kMany: always element by element, the more rays all over an element the
+  /// more light it sends, so that what is partly hidden by an edge is partly seen.
+  enum class Rays { kOne, kMany };
+
+  /// Irradiance at a lifted point [lx]; an adjacent element by its closed form.
+  glm::vec3 irradiance(glm::vec3 point, glm::vec3 normal, Rays rays) const;
 
  private:
   struct LitPatch {
@@ -37,11 +54,8 @@ class FirstBounce {
     float size;      // diameter [m]
   };
   struct LitPiece {
-    glm::vec3 corner[4];
-    int corner_count;
-    glm::vec3 middle;     // lifted
+    ElementShape shape;
     glm::vec3 radiosity;  // [lm/m²]
-    float area;
   };
   void add(const BrightElement& bright);
 

@@ -8,6 +8,7 @@
 
 #include "transom/engine.h"
 #include "transom/view.h"
+#include "transom/view_samples.h"
 
 namespace transom {
 
@@ -17,10 +18,11 @@ enum class Visibility { kRays, kVolumes };
 /// Settings of a picture.
 struct FrameOptions {
   Visibility visibility = Visibility::kRays;
-  int edge_samples = 4;  ///< per pixel and axis where an edge is found; 1: pixel centres only
+  int edge_samples = 4;    ///< per pixel and axis where an edge is found; 1: pixel centres only
+  bool components = true;  ///< the parts of the picture beside their sum
 };
 
-/// A picture in cd/m² by what the light has done last. Their sum is `radiance`.
+/// A picture in cd/m², and its parts by what the light has done last. Their sum is `radiance`.
 struct Frame {
   int width = 0, height = 0;
   std::vector<glm::vec3> radiance;
@@ -28,7 +30,7 @@ struct Frame {
   std::vector<glm::vec3> sky;       ///< sky and ground, reflected once
   std::vector<glm::vec3> indirect;  ///< reflected more than once
   std::vector<glm::vec3> emitted;   ///< emitters seen
-  std::vector<glm::vec3> exterior;  ///< what is seen through openings
+  std::vector<glm::vec3> exterior;  ///< sky and ground, and emitters seen through openings
   int edge_pixel_count = 0;         ///< pixels that were supersampled
 };
 
@@ -44,8 +46,8 @@ PrimaryHits trace_primary(const SceneGeometry& scene, const View& view);
 class ShadowVolumes;
 class GlContext;
 
-/// Renders the present lighting of an engine. Holds the GL context of the stencil method, made on first use; one
-/// thread.
+/// Renders the present lighting of an engine. What the last camera saw is kept: further pictures of it, under any
+/// light, cost beams and sums. Holds the GL context of the stencil method, made on first use; one thread.
 class FrameRenderer {
  public:
   explicit FrameRenderer(Engine& engine);
@@ -54,16 +56,20 @@ class FrameRenderer {
   Frame render(const View& view, FrameOptions options);
 
  private:
-  struct Sample;
-  class BeamShare;
+  class Masks;
   struct VolumeGroup {
     int opening;
     glm::vec3 normal;
   };
-  void render_volumes(const View& view, int samples_per_axis, std::vector<std::vector<float>>& shares);
-  void trace_and_shade(const View& view, std::span<Sample> samples, const BeamShare* volumes) const;
+  void render_masks(const View& view, Masks& masks);
+  void add_smooth_light(const ViewSamples& samples, bool components, Frame& frame) const;
+  void add_beam(const ViewSamples& samples, const Beam& beam, const std::vector<float>* mask_share, const Masks& masks,
+                std::vector<glm::vec3>& picture, std::vector<char>& is_edge) const;
+  void find_shares(const Beam& beam, std::span<const BeamPoint> points, const std::vector<float>* mask_share,
+                   const Masks& masks, std::span<float> shares) const;
 
   Engine& engine_;
+  std::unique_ptr<ViewSamples> samples_;  // of the last camera
   std::unique_ptr<GlContext> context_;
   std::unique_ptr<ShadowVolumes> volumes_;
   std::vector<VolumeGroup> volume_groups_;  // openings of one kind and orientation, as the stencil counts them

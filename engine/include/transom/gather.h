@@ -15,6 +15,8 @@ namespace transom {
 struct GatherSamples {
   int hemisphere = 1024;  ///< rays over the hemisphere
   int openings = 256;     ///< rays towards the openings in all
+
+  bool operator==(const GatherSamples&) const = default;
 };
 
 /// An index and a weight.

@@ -28,6 +28,8 @@ class NodeField {
             const std::vector<int>& divisions);
 
   const std::vector<Node>& nodes() const { return nodes_; }
+  /// The face that a node lies on, times two, plus the side.
+  int surface(std::size_t node) const { return surface_of_node_[node]; }
 
   /// Leaves out nodes that lie inside solids, and finds the cells that something divides. To be called once.
   void finish(std::vector<char> node_is_exposed);
@@ -50,6 +52,7 @@ class NodeField {
   std::vector<CellNodes> cells_;  // by slot
   std::vector<int> slots_;
   std::vector<Node> nodes_;
+  std::vector<int> surface_of_node_;
   std::vector<char> node_is_exposed_;
 };
 

@@ -33,16 +33,20 @@ class RayScene {
  public:
   enum class What { kOpaque, kOpenings, kAll };
 
+  /// Whether each sixteen rays in a row go about the same way. Says how to trace them, never what they meet.
+  enum class Order { kScattered, kCoherent };
+
   RayScene(const Faces& faces, const std::vector<Material>& materials, const std::vector<OpeningGroup>& openings);
   ~RayScene();
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
 
   /// First hit of every ray. `hits` has the size of `rays`.
-  void intersect(What what, std::span<const Ray> rays, std::span<Hit> hits) const;
+  void intersect(What what, std::span<const Ray> rays, std::span<Hit> hits, Order order = Order::kScattered) const;
 
   /// 1 where something opaque (or of `what`) lies between t_near and t_far, else 0.
-  void occluded(What what, std::span<const Ray> rays, std::span<std::uint8_t> blocked) const;
+  void occluded(What what, std::span<const Ray> rays, std::span<std::uint8_t> blocked,
+                Order order = Order::kScattered) const;
 
   /// Product of the transmittances of all openings between t_near and t_far of each ray. Opaque surfaces are not looked
   /// at.

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <vector>
 
 namespace transom {
 
@@ -28,6 +29,11 @@ class SobolSequence {
  private:
   std::array<std::uint32_t, 4> seeds_;  // by dimension
 };
+
+/// The indices of a Sobol sequence below the least power of two that holds `count`, in an order in which each sixteen
+/// lie close together in the first two dimensions, whatever the seed: scrambling moves cells of the square as a whole.
+/// For rays traced in packets; leave out those from `count` on.
+const std::vector<std::uint32_t>& coherent_order(int count);
 
 /// Maps the unit square to the unit disc, preserving area and neighbourhood [Shirley & Chiu 1997].
 glm::vec2 sample_disc(glm::vec2 u);

@@ -58,14 +58,14 @@ struct SectionLight {
 /// How far branches are followed.
 struct SectionOptions {
   int ray_count = 1024;       ///< stratified over the period
-  int maximum_events = 400;   ///< on one path
+  int maximum_events = 4000;  ///< on one path
   double split_share = 0.01;  ///< of the flux of a ray; a weaker branch does not divide, it goes one way by chance
   std::uint32_t seed = 1;
 };
 
 /// Sends parallel unpolarised light of one direction through a section. Branches of reflection and refraction are
 /// followed with their polarisation (Stokes vectors and Fresnel's Mueller matrices [Born & Wolf 1999, sections 1.5 and
-/// 10.9]); diffuse surfaces send one random ray a branch. The x component of the optical direction is constant, so that
+/// 10.9]); diffuse surfaces send one random ray a way. The x component of the optical direction is constant, so that
 /// a path moves in the plane. Exits of one direction are added up.
 SectionLight trace_section(const Section& section, glm::dvec3 direction, SectionOptions options);
 

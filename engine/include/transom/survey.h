@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "transom/geometry.h"
+#include "transom/light_mesh.h"
 #include "transom/ray_scene.h"
 
 namespace transom {
@@ -12,13 +13,19 @@ namespace transom {
 /// Follows random rays from where light enters or starts: the room sides of openings, emitters, point sources.
 ///
 /// A closed surface that light starts inside of is a room, whatever way its faces look: its component is opened in
-/// `faces`. Returns for each face whether such rays, reflected a few times and never passing an opening, have met it:
-/// the faces indoors. Every random number comes from `seed`.
+/// `faces`. Returns for each face which of its sides such rays, reflected a few times and never passing an opening,
+/// have met: 1 for its front, 2 for its back, 3 for both, 0 for a face that is not indoors. Every random number comes
+/// from `seed`.
 std::vector<char> survey_interior(const SceneGeometry& scene, const RayScene& rays, Faces& faces, std::uint32_t seed);
 
 /// Longest edge of patches for each face [m]: `maximum_edge` indoors, or the one that gives about `target_patch_count`
 /// patches there where it is 0; outdoors coarser, so that a large ground costs little.
 std::vector<float> choose_edges(const Faces& faces, const std::vector<char>& is_indoors, float maximum_edge,
                                 int target_patch_count);
+
+/// Slots, not yet patches, whose own rays meet a patch indoors: what thousands of rays from the patches have missed,
+/// such as thin blades, still exchanges light with them. is_interior: by slot.
+std::vector<int> slots_that_see(const std::vector<char>& is_interior, const std::vector<int>& patch_of_slot,
+                                const LightMesh& mesh, const RayScene& rays, std::uint32_t seed);
 
 }  // namespace transom

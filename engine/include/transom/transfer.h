@@ -1,5 +1,7 @@
-/// @file Interreflection between patches: form factors made reciprocal and closed, and the solution B = G (M + rho E).
+/// @file Sparse rows of weights, and form factors made reciprocal and closed.
 #pragma once
+
+#include <xmmintrin.h>
 
 #include <glm/glm.hpp>
 #include <vector>
@@ -25,6 +27,25 @@ struct SparseRows {
     for (std::size_t k = begin[row]; k < begin[row + 1]; ++k) sum += entries[k].weight * values[entries[k].index];
     return sum;
   }
+  /// The same for values of four floats, in the order of the row: two sums, added at the end.
+  glm::vec4 dot(std::size_t row, const std::vector<glm::vec4>& values) const {
+    const float* value = &values[0].x;
+    __m128 sums[2] = {_mm_setzero_ps(), _mm_setzero_ps()};
+    std::size_t k = begin[row];
+    const std::size_t end = begin[row + 1];
+    const auto term = [&](std::size_t i) {
+      return _mm_mul_ps(_mm_set1_ps(entries[i].weight),
+                        _mm_loadu_ps(value + 4 * static_cast<std::size_t>(entries[i].index)));
+    };
+    for (; k + 2 <= end; k += 2) {
+      sums[0] = _mm_add_ps(sums[0], term(k));
+      sums[1] = _mm_add_ps(sums[1], term(k + 1));
+    }
+    if (k < end) sums[0] = _mm_add_ps(sums[0], term(k));
+    glm::vec4 sum;
+    _mm_storeu_ps(&sum.x, _mm_add_ps(sums[0], sums[1]));
+    return sum;
+  }
 };
 
 /// How far sampled form factors were from what form factors must be, before and after mending.
@@ -43,13 +64,5 @@ struct TransferDefects {
 /// without entries stay empty.
 TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<float>& areas,
                                 const std::vector<float>& row_sums);
-
-/// Irradiance of each patch in E = direct + (F + K) B with B = emitted + rho E, by Gauss-Seidel sweeps until the flux
-/// still in flight is below `tolerance` of all flux. Returns the number of sweeps; throws std::runtime_error when
-/// `maximum_sweeps` do not suffice.
-int solve_interreflection(const SparseRows& form_factors, const SparseRows& through,
-                          const std::vector<glm::vec3>& reflectance, const std::vector<glm::vec3>& emitted,
-                          const std::vector<glm::vec3>& direct, const std::vector<float>& areas, double tolerance,
-                          int maximum_sweeps, std::vector<glm::vec3>& irradiance);
 
 }  // namespace transom

@@ -14,6 +14,8 @@ struct View {
   int width = 640;
   int height = 480;
 
+  bool operator==(const View&) const = default;
+
   /// Throws InputError for a camera without direction or size.
   void validate() const;
 };

@@ -22,6 +22,13 @@ def bench(
     budget: Annotated[
         float | None, typer.Option(min=1.0, metavar="SECONDS", help="Time to spend; default 150, or 40 with --quick.")
     ] = None,
+    speed_error: Annotated[
+        bool, typer.Option("--speed-error", help="Time and error of the engine, Mitsuba and Radiance.")
+    ] = False,
+    view: Annotated[str | None, typer.Option(help="With --speed-error: a view; the scene's first if omitted.")] = None,
+    condition: Annotated[
+        str | None, typer.Option(help="With --speed-error: a condition; the scene's first if omitted.")
+    ] = None,
     against: Annotated[str | None, typer.Option(metavar="REV", help="Compare with the build of a revision.")] = None,
     of: Annotated[
         str | None, typer.Option(metavar="REV", help="With --against: of this revision, not the working tree.")
@@ -36,14 +43,23 @@ def bench(
 
     Writes all samples to build/bench/SCENE.json; its fields are in reports/README.md.
 
+    --speed-error renders a view that has a stored reference with each program over its settings, and writes
+    build/bench/speed_error.json and .svg: error against time, and the speed-up at equal error.
+
     --against REV builds that revision and this one from nothing, times them in turn, and judges every phase: exit
     code 1 for one that is slower twice, by more than two processes of one build differ; 3 where more rounds decide.
 
     \b
     Example:  transom bench test_room -o bench.json
               transom bench test_room --quick
+              transom bench test_room --speed-error
               transom bench test_room --against HEAD~1
     """
+    if against is not None and speed_error:
+        raise InputError("and --speed-error are two different questions", field="--against", remedy="Ask one at a time")
+    if speed_error:
+        _speed_error(scene, output, view, condition, quick)
+        return
     if against is not None:
         code = _against(scene, output, against, of, rounds, patches, only or [])
         if code:
@@ -70,6 +86,25 @@ def _sizes(scene: str, output: Path | None, budget: float | None, quick: bool) -
     for line in bench_lines(measured):
         typer.echo(line)
     typer.echo(f"{path}: all samples")
+
+
+def _speed_error(scene: str, output: Path | None, view: str | None, condition: str | None, quick: bool) -> None:
+    from rich.console import Console
+
+    from transom.figures_speed import speed_error_figure
+    from transom.files import write_atomic
+    from transom.progress import CaseProgress
+    from transom.speed_error import SETTINGS, measure_speed_error, speed_error_lines, write_speed_error
+
+    path = _output(output, FOLDER / "speed_error.json")
+    count = sum(entry.quick or not quick for entry in SETTINGS)
+    with CaseProgress(count, Console(stderr=True)) as bars:
+        found = measure_speed_error(scene, bars, view=view, condition=condition, quick=quick)
+    write_speed_error(path, found)
+    write_atomic(path.with_suffix(".svg"), speed_error_figure(found))
+    for line in speed_error_lines(found):
+        typer.echo(line)
+    typer.echo(f"{path} and {path.with_suffix('.svg')}")
 
 
 def _against(

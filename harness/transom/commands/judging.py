@@ -40,9 +40,27 @@ def judge(suite: SuiteArgument, build: BuildOption = DEFAULT_BUILD) -> None:
 
     verdicts = judge_compared(suite, build)
     print_verdicts(verdicts)
+    for rule in _unused_rules(build):
+        typer.echo(f"tolerances.toml: {rule} judges nothing in any suite. Correct or delete it", err=True)
     code = exit_code(verdicts)
     if code:
         raise typer.Exit(code)
+
+
+def _unused_rules(build: Path) -> list[str]:
+    """Rules of tolerances.toml by which nothing is judged, once every suite has been compared; none before."""
+    from transom.comparison import read_comparison
+    from transom.judge import read_tolerances, unused_rules
+    from transom.scene import scene_root
+    from transom.suite import read_suites
+    from transom.workflow import comparison_file
+
+    files = [comparison_file(name, build) for name in read_suites()]
+    if not all(file.is_file() for file in files):
+        return []
+    subjects = [subject for file in files for subject in read_comparison(file).subjects()]
+    unused = unused_rules(read_tolerances(scene_root() / "tolerances.toml"), subjects)
+    return [f"{rule.quantity} ({rule.place() or 'everywhere'})" for rule in unused]
 
 
 def report(
@@ -51,17 +69,24 @@ def report(
     rendered: Annotated[
         bool, typer.Option("--rendered", help="Use the runs that are there; render and time nothing.")
     ] = False,
+    publish: Annotated[
+        bool, typer.Option("--publish", help="Also copy it to reports/published, part of the repository.")
+    ] = False,
 ) -> None:
-    """Run every suite, time the engine, and write the report: OUTPUT/index.html and OUTPUT/results.json.
+    """Run every suite, time the engine, and write the report.
 
-    The page is one file, with its pictures in it. Exit code as of `transom judge`, over all suites.
+    Writes OUTPUT/index.html (one file, with its pictures in it), report.pdf, junit.xml, results.json, tables.json and
+    tables/*.csv, all from the same tables. Exit code as of `transom judge`, over all suites.
 
     \b
     Example:  transom report
     """
     from transom.report.build import write_report
+    from transom.report.publish import publish as publish_report
 
     code = write_report(output, build, render=not rendered)
     typer.echo(f"{output / 'index.html'}")
+    if publish:
+        typer.echo(f"reports/published: {len(publish_report(output))} files")
     if code:
         raise typer.Exit(code)

@@ -37,7 +37,7 @@ class SkyModel:
     def luminance(self, directions: Float64) -> Float64:
         """Luminance [cd/m²] in unit directions (N, 3) -> (N,); 0 below the horizon."""
         result = np.zeros(len(directions))
-        if self.scale > 0:
+        if self.scale != 0:
             up = directions[:, 2] >= 0
             seen = directions[up]
             cos_sun_angle = seen @ np.array(self.sun_direction)

@@ -62,7 +62,10 @@ class Product:
         for name, value in changes.items():
             if name not in known:
                 raise InputError(
-                    f"is not a parameter of {self.name}", field=name, value=value, remedy=f"Choose from {', '.join(known)}"
+                    f"is not a parameter of {self.name}",
+                    field=name,
+                    value=value,
+                    remedy=f"Choose from {', '.join(known)}",
                 )
         record = self.record.model_copy(update={"parameters": {**self.record.parameters, **changes}})
         return replace(self, record=record)
@@ -78,7 +81,9 @@ def load_product(name: str) -> Product:
     folder = Path(name) if "/" in name else PRODUCT_ROOT / name
     file = folder / "product.toml"
     if not file.is_file():
-        raise InputError("is not a product", field="PRODUCT", value=name, remedy=f"Choose from {', '.join(list_products())}")
+        raise InputError(
+            "is not a product", field="PRODUCT", value=name, remedy=f"Choose from {', '.join(list_products())}"
+        )
     try:
         content: dict[str, Any] = tomllib.loads(file.read_text(encoding="utf-8"))
         record = ProductFile.model_validate(content)
@@ -87,6 +92,8 @@ def load_product(name: str) -> Product:
     except ValidationError as error:
         raise invalid_field(error, file) from error
     if record.shape not in SHAPES:
-        raise InputError("is not known", file=file, field="shape", value=record.shape, remedy=f"Use {', '.join(SHAPES)}")
+        raise InputError(
+            "is not known", file=file, field="shape", value=record.shape, remedy=f"Use {', '.join(SHAPES)}"
+        )
     product = Product(folder.name, file, record)
     return product.with_parameters({key: float(value) for key, value in record.parameters.items()})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -106,7 +107,7 @@ class Section:
 
 def polyline(points: Sequence[Point], **side: object) -> list[Line]:
     """Lines through points, all with the same sides."""
-    return [Line(a, b, **side) for a, b in zip(points[:-1], points[1:], strict=True)]  # type: ignore[arg-type]
+    return [Line(a, b, **side) for a, b in itertools.pairwise(points)]  # type: ignore[arg-type]
 
 
 def _within_period(a: Point, b: Point, period: float) -> list[tuple[Point, Point]]:
@@ -119,7 +120,7 @@ def _within_period(a: Point, b: Point, period: float) -> list[tuple[Point, Point
         cuts += [float((border - y0) / (y1 - y0)) for border in borders]
     cuts = sorted({round(cut, 15) for cut in cuts if 0 <= cut <= 1})
     pieces: list[tuple[Point, Point]] = []
-    for t0, t1 in zip(cuts[:-1], cuts[1:], strict=True):
+    for t0, t1 in itertools.pairwise(cuts):
         shift = np.floor((y0 + 0.5 * (t0 + t1) * (y1 - y0)) / period) * period
         start = (min(max(y0 + t0 * (y1 - y0) - shift, 0.0), period), z0 + t0 * (z1 - z0))
         end = (min(max(y0 + t1 * (y1 - y0) - shift, 0.0), period), z0 + t1 * (z1 - z0))

@@ -51,8 +51,8 @@ def prismatic(
     absorption: float = 0.0,
     prisms_outdoors: float = 0.0,
 ) -> Section:
-    """Prisms on a flat sheet. angle_low, angle_high: between the sheet and the facet that rises with y, and falls with y;
-    90 at most for one of them. prisms_outdoors: 1 turns the prisms towards the sun, 0 towards the room."""
+    """Prisms on a flat sheet. angle_low, angle_high: between the sheet and the facet that rises with y, and that falls
+    with y; 90 at most for one of them. prisms_outdoors: 1 turns the prisms towards the sun, 0 towards the room."""
     _require(pitch > 0 and base > 0, "pitch and base must be > 0")
     _require(0 < angle_low <= 90 and 0 < angle_high <= 90, "facet angles are within 0..90 degrees")
     _require(angle_low < 90 or angle_high < 90, "only one facet can be upright")
@@ -106,7 +106,9 @@ def slat_blind(
     points: list[Point] = []
     for u in along:
         bow = 4 * sagitta * (0.25 - u * u)
-        points.append((width * u * math.sin(t) + bow * math.cos(t), width * (u + 0.5) * math.cos(t) - bow * math.sin(t)))
+        points.append(
+            (width * u * math.sin(t) + bow * math.cos(t), width * (u + 0.5) * math.cos(t) - bow * math.sin(t))
+        )
     # a -> b runs into the room: its left is below (-y), its right above.
     lowered = [(y - SHEET_M, z) for y, z in points]
     lines = [
@@ -140,8 +142,8 @@ def curved_lamellae(
     pane: float = 0.004,
     gap: float = 0.003,
 ) -> Section:
-    """Curved bars stacked between two panes of glass, which guide light by total reflection. slope_out, slope_in: of the
-    bars at the outdoor and the room end, degrees from horizontal, positive rising into the room."""
+    """Curved bars stacked between two panes of glass, which guide light by total reflection. slope_out, slope_in: of
+    the bars at the outdoor and the room end, degrees from horizontal, positive rising into the room."""
     _require(spacing > thickness > 0 and depth > 0, "0 < thickness < spacing and depth > 0")
     z = np.linspace(0.0, depth, ARC_LINES + 1)
     a, b = math.tan(math.radians(slope_out)), math.tan(math.radians(slope_in))
@@ -165,7 +167,9 @@ def voids(
 ) -> Section:
     """A sheet with slender voids inside: level above, sloping below, blunt towards the room. cover: sheet before and
     behind the voids."""
-    _require(spacing > void_height > 0 and void_depth > 0 and cover > 0, "0 < void_height < spacing, depth and cover > 0")
+    _require(
+        spacing > void_height > 0 and void_depth > 0 and cover > 0, "0 < void_height < spacing, depth and cover > 0"
+    )
     thickness = void_depth + 2 * cover
     tip, top, bottom = (0.0, cover), (0.0, cover + void_depth), (-void_height, cover + void_depth)
     lines = [
@@ -180,7 +184,7 @@ def voids(
 def reflective_louvre(
     spacing: float, width: float, rise: float, bow: float, reflectance: float, reflectance_below: float
 ) -> Section:
-    """Fixed mirrored slats whose upper side is hollow: they send high sun to the ceiling and stop it from falling through.
+    """Fixed mirrored slats whose upper side is hollow: they send high sun to the ceiling.
 
     rise: of the room edge over the outer edge. bow: how far the middle hangs below the line between the edges.
     """

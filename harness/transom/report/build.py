@@ -10,8 +10,10 @@ from rich.console import Console
 from transom.comparison import COMPARISON_FORMAT, Comparison, read_comparison
 from transom.files import write_atomic
 from transom.judge import Missing, Outcome, ToleranceFile, Verdict, exit_code, judge, read_tolerances
-from transom.report.content import Content, Pictures, engine_source, make_content
-from transom.report.day import day_cases, find_day, render_day
+from transom.report.checks import read_check
+from transom.report.content import Content, Pictures, make_content
+from transom.report.day import day_cases, find_day, render_missing
+from transom.report.figure_13 import corner_errors, figure_13_cases, figure_13_strips
 from transom.report.junit import junit_xml
 from transom.report.notes import read_notes
 from transom.report.page import write_page
@@ -49,16 +51,18 @@ def write_report(output: Path, build: Path, *, render: bool = True) -> int:
     results = collect_results(judged, timings)
     cases = day_cases([suite for suite in suites if shows_views(suite)])
     if render:
-        render_day(cases, note)
+        render_missing([*figure_13_cases(suites), *cases], note)
     pictures = Pictures(
         rooms=[room for suite in suites if shows_views(suite) for room in rooms(suite)],
         hours=[grid for suite in suites if suite.layout == "hours" for grid in hour_grids(suite, results)],
         factoring=[strip for suite in suites if shows_views(suite) for strip in strips(suite)],
         day=find_day(cases),
-        figure_13=[],
+        figure_13=figure_13_strips(suites),
+        corners=list(corner_errors(suites)),
     )
-    speed = read_speed(build, dict.fromkeys(timing.scene for timing in timings), engine_source(results))
-    content = make_content(results, view_images(suites, results), pictures, speed, _tolerances(), notes)
+    speed = read_speed(build, _judged_scenes(suites))
+    images, checked = view_images(suites, results), read_check(build / "check" / "check.json")
+    content = make_content(results, images, pictures, speed, _tolerances(), notes, checked)
     write_files(output, content, judged)
     return exit_code(verdict for _, verdicts in judged for verdict in verdicts)
 
@@ -95,10 +99,15 @@ def _tolerances() -> ToleranceFile:
 
 def _timings(suites: Sequence[Suite], build: Path, note: Callable[[str], None]) -> list[Timing]:
     """Times every scene that is judged against Mitsuba."""
-    names = {case.scene.name: None for suite in suites if suite.reference == "mitsuba" for case in suite.cases}
-    timings = time_scenes(list(names), lambda name: note(f"Timing {name}"))
+    timings = time_scenes(_judged_scenes(suites), lambda name: note(f"Timing {name}"))
     write_timings(_timings_file(build), timings)
     return timings
+
+
+def _judged_scenes(suites: Sequence[Suite]) -> list[str]:
+    """Scenes that are judged against Mitsuba, by name."""
+    names = {case.scene.name: None for suite in suites if suite.reference == "mitsuba" for case in suite.cases}
+    return list(names)
 
 
 def _timings_file(build: Path) -> Path:

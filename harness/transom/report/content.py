@@ -8,16 +8,18 @@ from typing import Any
 
 import numpy as np
 
+from transom.check import Checked
 from transom.figures import TimingBar, timings_svg
 from transom.judge import ToleranceFile
 from transom.report import rows_images, rows_references, rows_speed, rows_verdicts
 from transom.report.day import Day
+from transom.report.figure_13 import CornerError, corner_table
 from transom.report.notes import NotesSection
 from transom.report.numbers import fixed, seconds, signed, words
 from transom.report.pictures import Drawing
 from transom.report.results import Results
 from transom.report.sections import HourGrid, RoomSection, Strip
-from transom.report.speed import Speed, speed_drawings
+from transom.report.speed import Speed, speed_drawing
 from transom.report.table import Table
 
 REPRODUCE = "transom report"
@@ -50,18 +52,19 @@ class Pictures:
     factoring: list[Strip]
     day: Day | None
     figure_13: list[Strip]
+    corners: list[CornerError]
 
 
 @dataclass(frozen=True)
 class Content:
-    """The report. tables: by name, in the order of the page."""
+    """The report. tables: by name, in the order of the page. drawings: by the name of the table that they are of."""
 
     results: Results
     headline: list[Headline]
     verdict_counts: list[tuple[str, int]]
     matrix: rows_verdicts.Matrix
     tables: dict[str, Table]
-    drawings: list[Drawing]
+    drawings: dict[str, Drawing]
     pictures: Pictures
     notes: list[NotesSection]
     absent: list[Absence]
@@ -75,9 +78,9 @@ def make_content(
     speed: Speed,
     tolerances: ToleranceFile,
     notes: list[NotesSection],
-    more: Sequence[Absence] = (),
+    checked: Sequence[Checked] = (),
 ) -> Content:
-    """images: rows of the suites that are shown view by view. more: parts that are missing, but are not tables."""
+    """images: rows of the suites that are shown view by view. checked: of `transom check`, where it has run."""
     build = engine_source(results)
     matrix = rows_verdicts.matrix(results)
     tables = [
@@ -89,21 +92,30 @@ def make_content(
         rows_references.crosschecks(results.crosschecks),
         rows_references.model_errors(results.model_errors),
         rows_references.ladder(results.ladder),
-        rows_references.analytic(results.analytic),
+        corner_table(pictures.corners),
+        rows_references.analytic(results.analytic, results.verdicts),
         rows_references.hard_cases(results.hard_cases),
-        rows_speed.use_time(results.timings, speed.loads_s, build),
+        rows_speed.use_time(rows_speed.use_times(results.timings, speed.benches, speed.loads_s, build)),
         rows_speed.timings(results.timings, build),
-        *speed.tables,
+        rows_speed.benches(speed.benches),
+        rows_speed.machine_limits(speed.benches),
+        rows_speed.speed_error(speed.speed_error),
+        rows_speed.speed_ups(speed.speed_error),
+        rows_verdicts.baseline(checked),
         rows_images.agreements(results.agreements),
         rows_verdicts.tolerance_use(tolerances, results),
         rows_verdicts.debt(tolerances),
     ]
-    drawings = list(speed_drawings(speed))
+    drawings: dict[str, Drawing] = {}
     if results.timings:
         label = "Median and 95th percentile of each time, logarithmic"
         caption = "Median (dot) and 95th percentile (end of the line). Grey: what the paper reports on its machine."
-        drawings.insert(0, Drawing(timings_svg(_timing_bars(results)), caption, label, build))
+        drawings["timings"] = Drawing(timings_svg(_timing_bars(results)), caption, label, build)
+    if speed.speed_error is not None and speed.speed_error.rows:
+        drawings["speed_error"] = speed_drawing(speed.speed_error)
     absent = [Absence(table.title, table.command) for table in tables if not table.rows and table.command]
+    if not pictures.figure_13:
+        absent.append(Absence("Figure 13 of the paper", "transom run crosscheck"))
     if pictures.day is None:
         absent.append(Absence("A day relit", REPRODUCE))
     absent += [
@@ -121,7 +133,7 @@ def make_content(
         drawings=drawings,
         pictures=pictures,
         notes=notes,
-        absent=[*absent, *more],
+        absent=absent,
         provenance=_provenance(results),
     )
 

@@ -12,7 +12,7 @@ from transom.bundle import Bundle, Case, find_bundle, make_case
 from transom.daylight.condition import resolve_condition
 from transom.renderer import load_renderer
 from transom.report.numbers import seconds
-from transom.report.pictures import Picture, toned_picture
+from transom.report.pictures import Picture, illustration
 from transom.run import Question, render_case
 from transom.suite import Suite, resized
 
@@ -57,8 +57,8 @@ def day_cases(suites: Sequence[Suite]) -> list[Case]:
     return []
 
 
-def render_day(cases: Sequence[Case], note: Callable[[str], None]) -> None:
-    """Renders what is not there yet. Hours share one solve."""
+def render_missing(cases: Sequence[Case], note: Callable[[str], None]) -> None:
+    """Renders with the engine what is not there yet. Cases of one scene share one solve."""
     engine = load_renderer("engine")
     for case in cases:
         if find_bundle(case) is None:
@@ -78,7 +78,7 @@ def find_day(cases: Sequence[Case]) -> Day | None:
     for case, bundle in found:
         moment = datetime.fromisoformat(case.condition.spec.time)
         labels.append(f"{moment:%H:%M}")
-        frames.append(toned_picture(f"{scene.title} at {moment:%H:%M}, {moment.day} {moment:%B}", bundle, view))
+        frames.append(illustration(f"{scene.title} at {moment:%H:%M}, {moment.day} {moment:%B}", bundle, view))
     moment = datetime.fromisoformat(cases[0].condition.spec.time)
     return Day(f"{scene.title}, {moment.day} {moment:%B}", labels, frames, _cost_words([bundle for _, bundle in found]))
 

@@ -23,6 +23,9 @@ ELEMENTS = {
 }
 """What each outcome is in JUnit; "" is a test case without a child."""
 
+BASELINE_ENDING = " baseline"
+"""Of the name of a suite that is compared with its blessed baseline, and not with references."""
+
 NOTHING_JUDGED = "nothing was judged: no comparison has a tolerance, or none was made"
 
 _NOT_XML = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -54,7 +57,9 @@ def case_names(verdicts: Iterable[Verdict]) -> list[str]:
 
 
 def reproduce_command(suite: str, scene: str) -> str:
-    """What renders, compares and judges a case again."""
+    """What renders, compares and judges a case again. A comparison with a baseline is named "SUITE baseline"."""
+    if suite.endswith(BASELINE_ENDING):
+        return f"transom check --suite {suite.removesuffix(BASELINE_ENDING)}"
     return f"transom run {suite}" + (f" --scene {scene}" if scene else "")
 
 
@@ -66,13 +71,13 @@ def _suite(comparison: Comparison, verdicts: Sequence[Verdict]) -> ET.Element:
     suite.set("skipped", "0")
     properties = ET.SubElement(suite, "properties")
     ET.SubElement(properties, "property", name="title", value=_clean(comparison.title))
-    ET.SubElement(properties, "property", name="reproduce", value=f"transom run {comparison.suite}")
+    ET.SubElement(properties, "property", name="reproduce", value=reproduce_command(comparison.suite, ""))
     for name, verdict in zip(case_names(verdicts), verdicts, strict=True):
         suite.append(_case(comparison.suite, name, verdict))
     if not verdicts:
         case = ET.SubElement(suite, "testcase", classname=f"transom.{comparison.suite}", name="suite")
         error = ET.SubElement(case, "error", type="NOTHING_JUDGED", message=NOTHING_JUDGED)
-        error.text = f"reproduce: transom run {comparison.suite}"
+        error.text = f"reproduce: {reproduce_command(comparison.suite, '')}"
     return suite
 
 

@@ -29,11 +29,19 @@ LEAST_LENGTH = 40
 
 
 @dataclass(frozen=True)
+class Span:
+    """A piece of a paragraph. code: set as a command or a name."""
+
+    text: str
+    code: bool
+
+
+@dataclass(frozen=True)
 class Note:
-    """A titled note: its paragraphs, plain text."""
+    """A titled note: its paragraphs, each in pieces."""
 
     title: str
-    paragraphs: list[str]
+    paragraphs: list[list[Span]]
 
 
 @dataclass(frozen=True)
@@ -65,10 +73,15 @@ def _read_section(folder: Path, letter: str, heading: str) -> NotesSection:
         elif text and not notes:
             raise InputError("has a paragraph before the first `## ` title", file=path, value=text[:40])
         elif text:
-            notes[-1].paragraphs.append(text)
+            notes[-1].paragraphs.append(_spans(text))
     silent = [note.title for note in notes if not note.paragraphs]
     if silent:
         raise InputError("has a note without text", file=path, field=silent[0], remedy=remedy)
-    if sum(len(text) for note in notes for text in note.paragraphs) < LEAST_LENGTH:
+    if sum(len(span.text) for note in notes for text in note.paragraphs for span in text) < LEAST_LENGTH:
         raise InputError("is empty", file=path, remedy=remedy)
     return NotesSection(letter, heading, notes)
+
+
+def _spans(text: str) -> list[Span]:
+    """A paragraph in pieces: what stands between backticks is code."""
+    return [Span(piece, bool(index % 2)) for index, piece in enumerate(text.split("`")) if piece]

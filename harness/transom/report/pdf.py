@@ -21,6 +21,11 @@ from transom.report.table import Table
 
 TEMPLATE = Path(__file__).resolve().parents[3] / "reports" / "templates" / "report.typ"
 
+JPEG_QUALITY = 92
+
+MOST_ROWS = 160
+"""Rows of one table that are printed; longer ones are for reading by machines, and are whole in the other formats."""
+
 NOT_PRINTED = ("verdicts", "matrix")
 """Printed by sections of their own: the matrix in colours, and of the list of verdicts what did not pass."""
 
@@ -80,10 +85,14 @@ def _record(content: Content, folder: Path) -> dict[str, Any]:
             "difference": _drawing(_standalone(scale_svg(DIFFERENCE_SCALE)), "difference", folder),
             "noise": _drawing(_standalone(scale_svg(NOISE_SCALE)), "noise", folder),
         },
-        "drawings": [
-            {"file": _drawing(entry.svg, f"drawing-{index}", folder), "caption": entry.caption, "source": entry.source}
-            for index, entry in enumerate(content.drawings)
-        ],
+        "drawings": {
+            name: {
+                "file": _drawing(entry.svg, f"drawing-{name}", folder),
+                "caption": entry.caption,
+                "source": entry.source,
+            }
+            for name, entry in content.drawings.items()
+        },
         "day": [_picture(frame, folder) for frame in (content.pictures.day.frames if content.pictures.day else [])],
         "figure_13": [
             {
@@ -105,10 +114,13 @@ def _table(table: Table) -> dict[str, Any]:
             "source": row.source,
             "cells": [{"text": cell.text, "kind": cell.kind, "number": cell.value is not None} for cell in row.cells],
         }
-        for row in table.rows
+        for row in table.rows[:MOST_ROWS]
     ]
     head = list(table.head)
-    return {"name": table.name, "title": table.title, "head": head, "rows": rows, "command": table.command}
+    title = table.title
+    if len(table.rows) > MOST_ROWS:
+        title += f" (the first {MOST_ROWS} of {len(table.rows)}; all are in tables/{table.name}.csv)"
+    return {"name": table.name, "title": title, "head": head, "rows": rows, "command": table.command}
 
 
 def _open(verdicts: Table) -> Table:
@@ -118,11 +130,10 @@ def _open(verdicts: Table) -> Table:
 
 
 def _picture(picture: Picture, folder: Path) -> dict[str, Any]:
-    """Writes a picture as PNG and says where it is."""
-    name = f"picture-{len(list(folder.glob('picture-*')))}.png"
-    stream = io.BytesIO()
-    Image.open(io.BytesIO(picture.content)).save(stream, "PNG")
-    (folder / name).write_bytes(stream.getvalue())
+    """Writes a picture as the PDF holds it (toned ones as JPEG, maps without loss) and says where it is."""
+    suffix = "png" if picture.scale else "jpg"
+    name = f"picture-{len(list(folder.glob('picture-*')))}.{suffix}"
+    Image.open(io.BytesIO(picture.content)).save(folder / name, quality=JPEG_QUALITY)
     return {"file": name, "caption": picture.caption, "source": picture.source}
 
 

@@ -14,7 +14,7 @@ from transom.bundle import Bundle, find_bundle, make_case
 from transom.colour import luminance
 from transom.compare import signed_relative_error
 from transom.errors import InputError
-from transom.figures import DIFFERENCE_SCALE, NOISE_SCALE, Scale, false_colour_png
+from transom.figures import Scale, false_colour_png
 from transom.images import tone_mapped
 from transom.noise import floor_cd_m2
 from transom.renderer import ImageResult, load_renderer
@@ -28,7 +28,7 @@ from transom.visible import FirstSurfaces
 @dataclass(frozen=True)
 class Picture:
     """One picture. scale: the name of the printed scale below it, "" for one that its section prints once.
-    source: the runs that it was made from. content: the file, PNG or WebP without loss.
+    source: the runs that it was made from. content: the file, WebP.
 
     Raises InputError for a picture that does not say where it is from.
     """
@@ -44,12 +44,8 @@ class Picture:
         require_source(self.caption, self.source)
 
     @property
-    def suffix(self) -> str:
-        return "webp" if self.content[8:12] == b"WEBP" else "png"
-
-    @property
     def uri(self) -> str:
-        return f"data:image/{self.suffix};base64," + base64.b64encode(self.content).decode()
+        return "data:image/webp;base64," + base64.b64encode(self.content).decode()
 
 
 @dataclass(frozen=True)
@@ -95,20 +91,24 @@ def factoring_pictures(view: View, found: CasePictures) -> list[Picture]:
     """The paper's Figure 5: everything but direct sun, direct sun, and their sum, by volumes and by rays."""
     if found.volumes is None or found.rays is None:
         return []
-    volumes, rays = found.volumes.image(), found.rays.image()
-    return [
-        toned("Sky and interreflected light", volumes.mean - volumes.components["sun"], view, found.volumes),
-        toned("Direct sun, shadow volumes", volumes.components["sun"], view, found.volumes),
-        toned("Sum, shadow volumes", volumes.mean, view, found.volumes),
-        toned("Sky and interreflected light", rays.mean - rays.components["sun"], view, found.rays),
-        toned("Direct sun, shadow rays", rays.components["sun"], view, found.rays),
-        toned("Sum, shadow rays", rays.mean, view, found.rays),
-    ]
+    parts = []
+    for bundle, what in ((found.volumes, "shadow volumes"), (found.rays, "shadow rays")):
+        image = bundle.image()
+        sun = image.components["sun"]
+        named = (("Sky and interreflected light", image.mean - sun), (f"Direct sun, {what}", sun))
+        for caption, rgb in (*named, (f"Sum, {what}", image.mean)):
+            parts.append(toned(caption, rgb, view, bundle, lossless=False))
+    return parts
 
 
 def toned_picture(caption: str, bundle: Bundle, view: View) -> Picture:
-    """One picture on its view's fixed scale."""
+    """One picture on its view's fixed scale, without loss."""
     return toned(caption, bundle.image().mean, view, bundle)
+
+
+def illustration(caption: str, bundle: Bundle, view: View) -> Picture:
+    """The same, smaller: to be looked at, not into."""
+    return toned(caption, bundle.image().mean, view, bundle, lossless=False)
 
 
 def white_words(view: View) -> str:
@@ -129,25 +129,22 @@ def difference_and_noise(
     return np.where(inside, difference, np.nan), np.where(inside, noise, np.nan), floor
 
 
-def toned(caption: str, rgb: NDArray[np.floating], view: View, bundle: Bundle) -> Picture:
+def toned(caption: str, rgb: NDArray[np.floating], view: View, bundle: Bundle, *, lossless: bool = True) -> Picture:
     """Radiance on the view's fixed scale."""
     pixels = tone_mapped(rgb, view.display_white_cd_m2)
     height, width = pixels.shape[:2]
-    return Picture(caption, webp_bytes(pixels), width, height, runs(bundle.record.key))
+    return Picture(caption, webp_bytes(pixels, lossless), width, height, runs(bundle.record.key))
 
 
 def false_coloured(caption: str, values: NDArray[np.floating], scale: Scale, source: str) -> Picture:
     """Values on a printed scale."""
     height, width = values.shape
-    return Picture(caption, false_colour_png(values, scale), width, height, source, scale.quantity)
+    pixels = np.asarray(Image.open(io.BytesIO(false_colour_png(values, scale))).convert("RGB"))
+    return Picture(caption, webp_bytes(pixels, lossless=True), width, height, source, scale.quantity)
 
 
-def webp_bytes(pixels: NDArray[np.uint8]) -> bytes:
-    """An 8-bit picture (h, w, 3) as WebP, without loss."""
+def webp_bytes(pixels: NDArray[np.uint8], lossless: bool) -> bytes:
+    """An 8-bit picture (h, w, 3) as WebP."""
     stream = io.BytesIO()
-    Image.fromarray(pixels).save(stream, "WEBP", lossless=True, quality=80, method=4)
+    Image.fromarray(pixels).save(stream, "WEBP", lossless=lossless, quality=90, method=5)
     return stream.getvalue()
-
-
-PRINTED_SCALES = (DIFFERENCE_SCALE, NOISE_SCALE)
-"""Scales that are the same for every view."""

@@ -54,7 +54,8 @@ def _row(title: str, source: type, verdicts: Sequence[str], **more: Any) -> type
 
 
 def _fields(source: type) -> dict[str, Any]:
-    return {name: (hint, ...) for name, hint in get_type_hints(source).items()}
+    """Fields of a dataclass. A number that is not finite is null in JSON, which has no other way to write it."""
+    return {name: (float | None if hint is float else hint, ...) for name, hint in get_type_hints(source).items()}
 
 
 ImageRow = _row("ImageRow", ImageComparison, ("mean_relative_error_verdict", "bias_verdict", "block_verdict"))
@@ -181,7 +182,7 @@ def _collect(
 
 
 def write_results(path: Path, results: Results) -> None:
-    write_atomic(path, results.model_dump_json(indent=1) + "\n")
+    write_atomic(path, results.model_dump_json() + "\n")
 
 
 def schema_texts() -> dict[str, str]:

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from transom.report.numbers import decimals_of, seconds, words
+from transom.report.numbers import decimals_of, fixed, seconds, signed, words
 from transom.report.rows_images import verdict_cell
 from transom.report.table import Cell, Row, Table, known_number, number, signed_number, texts
 
-PROGRAM_WORDS = {"engine": "Transom", "mitsuba": "Mitsuba 3", "radiance": "Radiance"}
+PROGRAM_WORDS = {"engine": "Transom", "classic": "Classic method", "mitsuba": "Mitsuba 3", "radiance": "Radiance"}
+
+
+def program_words(name: str) -> str:
+    return PROGRAM_WORDS.get(name, words(name))
 
 
 def crosschecks(entries: Iterable[Any]) -> Table:
@@ -45,7 +49,7 @@ def crosschecks(entries: Iterable[Any]) -> Table:
         "Difference [%]",
         "u [%]",
         "Verdict",
-        "Why it is larger",
+        "Note",
     )
     title = "The references against each other"
     return Table("crosscheck", title, head, tuple(rows), "transom run crosscheck")
@@ -86,7 +90,7 @@ def ladder(entries: Iterable[Any]) -> Table:
                 signed_number(row.bias_percent, 2),
             ),
             row.origin,
-            f"{PROGRAM_WORDS.get(row.program, row.program)}: {words(row.scene)}, {row.view}, {row.condition}",
+            f"{program_words(row.program)}: {words(row.scene)}, {row.view}, {row.condition}",
         )
         for row in entries
     ]
@@ -102,23 +106,33 @@ def ladder(entries: Iterable[Any]) -> Table:
     return Table("ladder", title, head, tuple(rows), "transom run crosscheck")
 
 
-def analytic(entries: Iterable[Any]) -> Table:
-    """Known answers: a case, and each program's error on it."""
-    rows = []
+def analytic(entries: Iterable[Any], verdicts: Iterable[Any]) -> Table:
+    """Known answers: a case a row, and each program's value, error and verdict beside the bound."""
+    cases: dict[tuple[str, ...], dict[str, Any]] = {}
     for row in entries:
-        digits = decimals_of(row.truth_uncertainty or abs(row.truth) * 1e-5, 4)
-        cells = (
-            Cell(row.quantity, title=row.source),
-            Cell(PROGRAM_WORDS.get(row.program, row.program)),
-            Cell(row.unit),
-            number(row.truth, digits),
-            number(row.value, digits),
-            signed_number(row.error_percent, 3),
-            number(row.error_uncertainty_percent, 3),
-            verdict_cell([row.verdict]),
-        )
-        rows.append(Row(cells, row.origin, words(row.scene)))
-    head = ("Quantity", "Program", "Unit", "Truth", "Value", "Error [%]", "u [%]", "Verdict")
+        cases.setdefault((row.suite, row.scene, row.quantity), {})[row.program] = row
+    programs = [name for name in PROGRAM_WORDS if any(name in found for found in cases.values())]
+    bounds: dict[tuple[str, ...], float | None] = {
+        (v.suite, v.scene, v.region): v.tolerance for v in verdicts if v.quantity == "analytic_percent"
+    }
+    rows = []
+    for place, found in cases.items():
+        first = next(iter(found.values()))
+        digits = decimals_of(first.truth_uncertainty or abs(first.truth) * 1e-5, 4)
+        cells = [Cell(first.quantity, title=first.source), Cell(first.unit), number(first.truth, digits)]
+        cells.append(number(bounds.get(place), 2))
+        for name in programs:
+            entry = found.get(name)
+            if entry is None:
+                cells += [Cell("", kind="muted")] * 3
+                continue
+            cells.append(number(entry.value, digits))
+            error = signed(entry.error_percent, 3)
+            noise = f" ± {fixed(entry.error_uncertainty_percent, 3)}" if entry.error_uncertainty_percent else ""
+            cells += [Cell(error + noise, entry.error_percent), verdict_cell([entry.verdict])]
+        rows.append(Row(tuple(cells), first.origin, words(first.scene)))
+    columns = [(program_words(name), f"{program_words(name)}, error [%]", "Verdict") for name in programs]
+    head = ("Quantity", "Unit", "Truth", "Bound [%]", *(name for triple in columns for name in triple))
     return Table("analytic", "Known answers", head, tuple(rows), "transom run analytic")
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from transom.bench import Bench
 from transom.report.numbers import fixed, seconds, words
-from transom.report.rows_references import PROGRAM_WORDS
-from transom.report.table import Cell, Row, Table, number
+from transom.report.rows_references import program_words
+from transom.report.table import KEY_LENGTH, Cell, Row, Table, number
+from transom.speed_error import SpeedError
 from transom.timing import Timing
 
 PAPER_RANGES_S: dict[str, tuple[float, float]] = {
@@ -33,13 +35,18 @@ HELIODON_SUN_S = 29.0
 HELIODON = "Glaser, Smith & Cutler 2006, as cited by Cutler et al. 2008, section 5"
 """Average times of users at a physical heliodon: to set a model up on the table, and to set a new sun position."""
 
+SPEED_ERROR_COMMAND = "transom bench SCENE --speed-error"
+
+PHASE_WORDS = {"cold": "from nothing", "hour": "a further hour"}
+
 TIMING_WORDS = {
     "load": "Load the scene",
     "solve": "Solve (geometry and reflectance)",
     "relight": "Relight (a new sun and sky)",
+    "reglaze": "New glazing (solve and relight)",
     "relight_hour": "Relight (a new hour)",
     "relight_sky": "Relight (a new sky only)",
-    "relight_glazing": "Relight (new glazing)",
+    "relight_overcast": "Relight (overcast, no beam)",
     "frame_volumes": "Frame, shadow volumes",
     "frame_rays": "Frame, shadow rays",
     "sensors": "Sensors",
@@ -68,7 +75,37 @@ def timings(entries: Iterable[Timing], source: str) -> Table:
     return Table("timings", "Times of the engine", head, tuple(rows), "transom report")
 
 
-def use_time(entries: Sequence[Timing], loads_s: dict[str, float], source: str) -> Table:
+@dataclass(frozen=True)
+class UseTime:
+    """What a user waits for at one scene [s]: load_s None where it was not timed."""
+
+    scene: str
+    load_s: float | None
+    solve_s: float
+    relight_s: float
+    source: str
+
+
+def use_times(
+    entries: Sequence[Timing], benches: Sequence[Bench], loads_s: Mapping[str, float], source: str
+) -> list[UseTime]:
+    """From the benches where there are any, else from the report's own timings."""
+    found: dict[str, UseTime] = {}
+    by_scene: dict[str, dict[str, float]] = {}
+    for timing in entries:
+        by_scene.setdefault(timing.scene, {})[timing.quantity] = timing.median
+    for scene, medians in by_scene.items():
+        if "solve" in medians and "relight" in medians:
+            found[scene] = UseTime(scene, loads_s.get(scene), medians["solve"], medians["relight"], source)
+    for bench in benches:
+        medians = {entry.quantity: entry.median for entry in bench.measurements if entry.sweep == "default"}
+        if {"load", "solve", "relight_hour"} <= medians.keys():
+            times = (medians["load"], medians["solve"], medians["relight_hour"])
+            found[bench.scene] = UseTime(bench.scene, *times, bench_source(bench))
+    return list(found.values())
+
+
+def use_time(found: Sequence[UseTime]) -> Table:
     """The paper's use-time comparison: a heliodon's set-up against load and solve, its new sun against a relight."""
     rows = [
         Row(
@@ -77,64 +114,125 @@ def use_time(entries: Sequence[Timing], loads_s: dict[str, float], source: str) 
                 Cell("model put on the table"),
                 Cell(seconds(HELIODON_SETUP_S), HELIODON_SETUP_S),
                 Cell(seconds(HELIODON_SUN_S), HELIODON_SUN_S),
-                Cell("1"),
-                Cell("1"),
+                number(1, 0),
+                number(1, 0),
             ),
             HELIODON,
         )
     ]
-    by_scene: dict[str, dict[str, float]] = {}
-    for timing in entries:
-        by_scene.setdefault(timing.scene, {})[timing.quantity] = timing.median
-    for scene, found in by_scene.items():
-        if "solve" not in found or "relight" not in found:
-            continue
-        load = loads_s.get(scene)
-        begin = found["solve"] + (load or 0.0)
-        what = "load and solve" if load is not None else "solve (loading not timed)"
+    for times in found:
+        begin = times.solve_s + (times.load_s or 0.0)
         cells = (
-            Cell(f"Transom, {words(scene).lower()}"),
-            Cell(what),
+            Cell(f"Transom, {words(times.scene).lower()}"),
+            Cell("load and solve" if times.load_s is not None else "solve (loading not timed)"),
             Cell(seconds(begin), begin),
-            Cell(seconds(found["relight"]), found["relight"]),
+            Cell(seconds(times.relight_s), times.relight_s),
             number(HELIODON_SETUP_S / begin, 0),
-            number(HELIODON_SUN_S / found["relight"], 0),
+            number(HELIODON_SUN_S / times.relight_s, 0),
         )
-        rows.append(Row(cells, source))
+        rows.append(Row(cells, times.source))
     head = ("", "Set-up", "Set-up takes", "A new sun takes", "Set-up, times faster", "New sun, times faster")
     return Table("use_time", "Time in use, beside a heliodon", head, tuple(rows), "transom report")
 
 
-def speed_error(entries: Iterable[Any], source: str) -> Table:
-    """Time and error of each program at each setting."""
+def bench_source(bench: Bench) -> str:
+    found = bench.provenance
+    return f"engine {bench.engine_build}, {found.processor}, {bench.created:%Y-%m-%d %H:%M}"
+
+
+def benches(found: Sequence[Bench]) -> Table:
+    """Every quantity of every point of the sweeps."""
     rows = []
-    for row in entries:
+    for bench in found:
+        for entry in bench.measurements:
+            values = [Cell(seconds(value), value) for value in (entry.first, entry.median, entry.p95)]
+            if entry.unit != "s":
+                values = [Cell(""), Cell(f"{fixed(entry.median, 0)} {entry.unit}", entry.median), Cell("")]
+            size = f", {entry.width}×{entry.height}" if entry.width else ""
+            cells = (
+                Cell(timing_words(entry.quantity) + size),
+                Cell(entry.sweep),
+                number(entry.patches, 0),
+                number(entry.openings, 0),
+                *values,
+                number(len(entry.samples), 0),
+            )
+            rows.append(Row(cells, bench_source(bench), words(bench.scene)))
+    head = ("", "Varied", "Patches", "Panes", "First", "Median", "p95", "Repeats")
+    return Table("bench", "Times against patches and openings", head, tuple(rows), "transom bench SCENE")
+
+
+def machine_limits(found: Sequence[Bench]) -> Table:
+    """Phases against what the machine can do: memory bandwidth for products, rays for visibility."""
+    rows = [
+        Row(
+            (
+                Cell(entry.phase),
+                Cell(entry.counted),
+                Cell(f"{fixed(entry.rate / 1e9, 3)} G{entry.unit}", entry.rate),
+                Cell(words(entry.limit)),
+                number(100 * entry.share, 1),
+            ),
+            bench_source(bench),
+            words(bench.scene),
+        )
+        for bench in found
+        for entry in bench.utilisations
+    ]
+    head = ("Phase", "Counted", "Rate", "Limit of the machine", "Share of it [%]")
+    return Table("machine_limits", "Against the limits of the machine", head, tuple(rows), "transom bench SCENE")
+
+
+def speed_error(found: SpeedError | None) -> Table:
+    """Time and error of each program at each setting; what could not be measured, and why."""
+    rows = []
+    for row in found.rows if found else ():
         median = float(np.median(row.seconds))
         cells = (
-            Cell(PROGRAM_WORDS.get(row.program, row.program)),
+            Cell(program_words(row.program)),
             Cell(row.setting),
-            Cell({"cold": "cold start", "hour": "a new hour"}.get(row.phase, row.phase)),
+            Cell(PHASE_WORDS[row.phase]),
             Cell(seconds(median), median),
             number(len(row.seconds), 0),
             number(row.error_percent, 2),
             number(row.error_uncertainty_percent, 2),
+            Cell(row.dominated_by or "–"),
         )
-        rows.append(Row(cells, source, f"{words(row.scene)}, {row.view}, {row.condition}"))
-    head = ("Program", "Setting", "Phase", "Time, median", "Repeats", "Mean pixel error [%]", "u [%]")
-    return Table("speed_error", "Speed against error", head, tuple(rows), "transom bench --speed-error")
+        rows.append(Row(cells, _speed_source(found), f"{words(row.scene)}, {row.view}, {row.condition}"))
+    for missing in found.missing if found else ():
+        said = (Cell(program_words(missing.program)), Cell(missing.setting), Cell(missing.reason, kind="muted"))
+        rows.append(Row((*said, *[Cell("")] * 5), _speed_source(found), "Not measured"))
+    head = (
+        "Program",
+        "Setting",
+        "Phase",
+        "Time, median",
+        "Repeats",
+        "Mean pixel error [%]",
+        "u [%]",
+        "As fast and as right",
+    )
+    return Table("speed_error", "Speed against error", head, tuple(rows), SPEED_ERROR_COMMAND)
 
 
-def speed_ups(entries: Iterable[Any], source: str) -> Table:
+def speed_ups(found: SpeedError | None) -> Table:
     """How many times faster the engine is at equal error, with the interval."""
     rows = []
-    for row in entries:
+    for row in found.speed_ups if found else ():
         cells = (
-            Cell(PROGRAM_WORDS.get(row.program, row.program)),
-            Cell({"cold": "cold start", "hour": "a new hour"}.get(row.phase, row.phase)),
+            Cell(program_words(row.program)),
+            Cell(PHASE_WORDS[row.phase]),
             number(row.at_error_percent, 2),
             number(row.ratio, 1),
             Cell(f"{fixed(row.low, 1)} to {fixed(row.high, 1)}"),
+            Cell(row.kind.replace("_", " ")),
         )
-        rows.append(Row(cells, source))
-    head = ("Against", "Phase", "At mean pixel error [%]", "Times faster", "Interval")
-    return Table("speed_ups", "Speed at equal error", head, tuple(rows), "transom bench --speed-error")
+        rows.append(Row(cells, _speed_source(found)))
+    head = ("Against", "Phase", "At mean pixel error [%]", "Times faster", "95 % interval", "How it was found")
+    return Table("speed_ups", "Speed at equal error", head, tuple(rows), SPEED_ERROR_COMMAND)
+
+
+def _speed_source(found: SpeedError | None) -> str:
+    if found is None:
+        return ""
+    return f"reference {found.reference_key[:KEY_LENGTH]}, {found.provenance.processor}, {found.created:%Y-%m-%d %H:%M}"

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from transom.check import Checked
 from transom.judge import Outcome, Tolerance, ToleranceFile, Verdict, tolerance_debt
 from transom.report.junit import reproduce_command
 from transom.report.numbers import fixed, words
@@ -124,7 +125,7 @@ def verdict_list(results: Results) -> Table:
         parts = [part for part in place if part] + ([f"no. {number_in_set.group(1)}"] if number_in_set else [])
         needed = "" if verdict.batches_needed is None else f"{fixed(verdict.batches_needed, 0)} batches"
         cells = (
-            Cell(verdict.outcome, kind="verdict", title=verdict.reason),
+            Cell(verdict.outcome, kind="verdict", title="" if verdict.outcome is Outcome.PASS else verdict.reason),
             Cell(quantity_words(verdict.quantity)),
             Cell(titles[verdict.suite]),
             Cell(words(verdict.scene)),
@@ -145,7 +146,7 @@ def verdict_list(results: Results) -> Table:
         "Scene",
         "Where",
         "Difference",
-        "k u",
+        "k\N{NO-BREAK SPACE}u",
         "b",
         "Tolerance",
         "To decide",
@@ -209,6 +210,43 @@ def debt(tolerances: ToleranceFile) -> Table:
     ]
     head = ("Quantity", "Where", "Tolerance", "General tolerance", "Times looser", "Reason")
     return Table("tolerance_debt", "Tolerance debt", head, tuple(rows), "")
+
+
+BASELINE_ROWS = 60
+"""Measures that a report lists against the baseline when all pass."""
+
+
+def baseline(checked: Sequence[Checked]) -> Table:
+    """Measures against their blessed values, what did not pass first, then those that moved most. Without reference
+    noise, so that drift shows. check.json holds all."""
+    found = [
+        (drift, verdict, suite)
+        for suite in checked
+        for drift, verdict in zip(suite.drifts, suite.baseline_verdicts, strict=False)
+    ]
+    found.sort(key=lambda entry: (WORST_FIRST.index(entry[1].outcome), -abs(entry[0].difference)))
+    count = max(BASELINE_ROWS, sum(verdict.outcome != Outcome.PASS for _, verdict, _ in found))
+    rows = []
+    for drift, verdict, suite in found[:count]:
+        cells = (
+            Cell(verdict.outcome, kind="verdict"),
+            Cell(drift.case),
+            Cell(f"{words(drift.category)}, {drift.place}" if drift.place else words(drift.category)),
+            _significant(drift.before),
+            _significant(drift.now),
+            signed_number(drift.difference, 3),
+            number(drift.uncertainty, 3),
+            _maybe(verdict.tolerance, 2),
+        )
+        source = f"{suite.suite}, {suite.blessed}, seed {suite.seed or 'default'}"
+        rows.append(Row(cells, source))
+    head = ("Verdict", "Case", "Measure", "Blessed", "Now", "Difference [%]", "u [%]", "Tolerance [%]")
+    of_all = f": {count} of {len(found)} measures, worst first" if len(found) > count else ""
+    return Table("baseline", f"Against the blessed baseline{of_all}", head, tuple(rows), "transom check")
+
+
+def _significant(value: float | None) -> Cell:
+    return Cell("absent", kind="muted") if value is None else Cell(f"{value:.5g}", value)
 
 
 def _judged_by(rule: Tolerance, results: Results) -> list[Any]:

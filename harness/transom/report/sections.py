@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from transom.report.numbers import fixed, words
-from transom.report.pictures import Picture, factoring_pictures, find_pictures, toned_picture, white_words
+from transom.report.pictures import Picture, factoring_pictures, find_pictures, illustration, toned_picture, white_words
 from transom.report.results import Results
 from transom.report.rows_images import HEADLINE_METHOD, view_group
 from transom.report.viewer import Viewer, make_viewer
@@ -118,8 +118,8 @@ def hour_grids(suite: Suite, results: Results) -> list[HourGrid]:
             for entry in entries:
                 found = find_pictures(entry, view)
                 cells[_day_and_hour(entry)] = HourCell(
-                    toned_picture("Transom", found.volumes, view) if found.volumes else None,
-                    toned_picture("Mitsuba 3", found.reference, view) if found.reference else None,
+                    illustration("Transom", found.volumes, view) if found.volumes else None,
+                    illustration("Mitsuba 3", found.reference, view) if found.reference else None,
                     _error_words(results, suite, entry, view.name),
                 )
             days = list(dict.fromkeys(day for day, _ in cells))

@@ -50,8 +50,11 @@ NO_NOISE_VALUE = 255
 
 @dataclass(frozen=True)
 class Viewer:
-    """One view in one condition, to be looked into. pictures: what is printed, and shown without a script: ours, the
-    reference's, their difference and the noise. data: what the script decodes, JSON."""
+    """One view in one condition, to be looked into.
+
+    pictures: ours, the reference's, their difference, and the noise; the first three are shown where no script runs,
+    all are printed in the PDF. data: what the script decodes, JSON.
+    """
 
     anchor: str
     title: str

@@ -11,6 +11,7 @@ from transom.errors import InputError
 from transom.scene.enclosure import COVER_M, TriangleRays, find_escape
 from transom.scene.mesh import RawMesh
 from transom.scene.model import Mesh, Region, Scene
+from transom.scene.polygons import triangle_distances
 from transom.scene.regions import region_objects
 from transom.scene.schema import SceneTable
 from transom.scene.wording import near, shown_path
@@ -20,6 +21,10 @@ RAY_COUNT = 512
 
 ESCAPE_TOLERANCE = 0.005
 """Share of rays that may leave: seams of a few millimetres are below it, a missing wall is far above."""
+
+
+SOURCE_DISTANCE = 2e-5
+"""Least distance of a point source from the surfaces, against the scene's size: twice the lift of the engine's rays."""
 
 
 def check_names(table: SceneTable, file: str) -> None:
@@ -149,6 +154,28 @@ def check_light(scene: Scene, file: str) -> None:
             file=file,
             field="scene",
             remedy="Add [[openings]], [[point_sources]] or a luminance_cd_m2",
+        )
+
+
+def check_point_sources(scene: Scene, file: str) -> None:
+    """Each point source stands off the surfaces, so that it is clear which side it lights. Raises InputError."""
+    mesh = scene.mesh
+    triangles, source_face = mesh.triangles()
+    corners = mesh.vertices[triangles]
+    least = SOURCE_DISTANCE * float(np.ptp(mesh.vertices, axis=0).max())
+    for index, source in enumerate(scene.point_sources):
+        distance = triangle_distances(np.array(source.position), corners)
+        nearest = int(np.argmin(distance))
+        if distance[nearest] >= least:
+            continue
+        face = int(source_face[nearest])
+        owner = mesh.objects[int(mesh.face_object[face])]
+        raise InputError(
+            f"of {source.name!r} lies on a face of object {owner!r}",
+            file=file,
+            field=f"point_sources[{index}].position_m",
+            value=list(source.position),
+            remedy=f"Move it off by {2 * least:.2g} m or more, to the side that it is to light",
         )
 
 

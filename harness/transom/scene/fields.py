@@ -48,7 +48,7 @@ def _span(low: float, high: float, below: bool) -> str:
 
 def _likely_share(number: float, high: float) -> str:
     """For shares (0..1): the number that was probably meant, as a misplaced point or a percentage."""
-    if high != 1.0 or not 1.0 < number <= 100.0:
+    if not 0.99 < high <= 1.0 or not 1.0 < number <= 100.0:
         return ""
     return f"Did you mean {number / 10 if number < 10 else number / 100:.6g}?"
 

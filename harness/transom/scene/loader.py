@@ -103,6 +103,7 @@ def load_scene(name_or_path: str | Path) -> Scene:
         tags=table.tags,
     )
     checks.check_light(scene, shown)
+    checks.check_point_sources(scene, shown)
     checks.check_regions(scene.regions, mesh, shown)
     checks.check_doubled_faces(scene, mesh_shown)
     checks.check_enclosure(scene, mesh_shown)

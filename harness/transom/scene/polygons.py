@@ -136,3 +136,18 @@ def _cut_ears(points: Float64) -> list[tuple[int, ...]]:
         del remaining[best]
     triangles.append((remaining[0], remaining[1], remaining[2]))
     return _proper(triangles, points)
+
+
+def triangle_distances(point: Float64, corners: Float64) -> Float64:
+    """Distance (T,) of a point (3,) from triangles (T, 3, 3) [Ericson 2005, Real-Time Collision Detection, 5.1.5]."""
+    start, along = corners, np.roll(corners, -1, axis=1) - corners
+    length2 = np.einsum("tkd,tkd->tk", along, along)
+    share = np.einsum("tkd,tkd->tk", point - start, along) / np.where(length2 > 0, length2, 1.0)
+    nearest = start + np.clip(share, 0.0, 1.0)[:, :, None] * along
+    to_edges = np.linalg.norm(nearest - point, axis=2).min(axis=1)
+    normal = np.cross(along[:, 0], along[:, 1])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    inward = np.einsum("tkd,tkd->tk", np.cross(normal[:, None, :], along), point - start)
+    height = np.abs(np.einsum("td,td->t", point - corners[:, 0], normal))
+    distances: Float64 = np.where(np.all(inward >= 0, axis=1), height, to_edges)
+    return distances

@@ -29,6 +29,8 @@ from transom.scene.fields import (
 )
 
 INFINITY = math.inf
+MAX_REFLECTANCE = 0.999
+"""The engine's limit: light in a closed room of reflectance 1 would grow without end."""
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
 
 
@@ -60,7 +62,7 @@ class SiteTable(Table):
 class MaterialTable(Table):
     """[materials.NAME]: a surface, diffuse on both sides."""
 
-    reflectance: Annotated[Vector, rgb(0.0, 1.0, "diffuse reflectance, linear Rec. 709", below=True)] = (0.0, 0.0, 0.0)
+    reflectance: Annotated[Vector, rgb(0.0, MAX_REFLECTANCE, "diffuse reflectance, linear Rec. 709")] = (0.0, 0.0, 0.0)
     luminance_cd_m2: Annotated[Vector, rgb(0.0, INFINITY, "own luminance, cd/m²")] = (0.0, 0.0, 0.0)
     smooth: Switch = False
 

@@ -6,7 +6,7 @@ const verdictRows = [...document.querySelectorAll(".verdict-list tbody tr")].map
   const [outcome, scene] = (element.dataset.tags || "|").split("|");
   return { element, outcome, scene, text: element.textContent.toLowerCase() };
 });
-const VISIBLE_AT_FIRST = 60;
+const VISIBLE_AT_FIRST = 24;
 
 function filterVerdicts(everything) {
   const words = filterForm.elements.text.value.toLowerCase().split(/\s+/).filter(Boolean);

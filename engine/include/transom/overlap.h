@@ -1,0 +1,16 @@
+/// @file Faces that lie on each other, between which light cannot choose.
+#pragma once
+
+#include <vector>
+
+#include "transom/geometry.h"
+#include "transom/ray_scene.h"
+
+namespace transom {
+
+/// Throws InputError for two faces indoors that lie in one plane (nearer than the lift of ray origins), overlap, and
+/// can are lit where they do: which of them light meets would be chance, and both would receive it. A box that stands
+/// on the floor covers it and is no such pair. is_indoors: by face, see survey.h.
+void check_overlaps(const Faces& faces, const std::vector<char>& is_indoors, const RayScene& rays);
+
+}  // namespace transom

@@ -1,0 +1,63 @@
+/// @file How fixed points see the patches that beams light: found once for a geometry, used for every condition.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "transom/first_bounce.h"
+#include "transom/light_mesh.h"
+#include "transom/ray_scene.h"
+
+namespace transom {
+
+/// The first reflection of beams towards fixed points, as FirstBounce finds it for any point, without rays once a
+/// patch has been linked: each link holds what stands between a point and a patch.
+///
+/// A patch at least four diameters away counts as a point at the centroid of its light, seen as much as the middle of
+/// its exposed part is seen. Nearer points see each element for itself, with its own weight.
+class PointLinks {
+ public:
+  PointLinks(const LightMesh& mesh, const RayScene& rays, const std::vector<Node>& points);
+
+  /// Links the patches of these slots to all points, as far as memory allows.
+  void prepare(const std::vector<int>& slots);
+
+  /// Adds to the irradiance of every point [lx] what the bright elements send to it; elements of one slot stand
+  /// together. Links what has not been linked.
+  void add_irradiance(const std::vector<BrightElement>& bright, std::vector<glm::vec3>& irradiance);
+
+  /// Memory held by links [bytes].
+  std::size_t byte_count() const { return byte_count_; }
+
+ private:
+  static constexpr std::size_t kBlock = 64;  // points
+  /// What one patch is to all points. A seen share T is stored as 255 sqrt(T): 1 is exact, dark glass keeps its digits.
+  struct Link {
+    bool is_ready = false;
+    std::vector<int> block;          // blocks of points in front of the patch, ascending
+    std::vector<std::uint8_t> seen;  // kBlock for each of them: of far points; 0 for near ones
+    std::vector<int> near_point;     // ascending
+    std::vector<float> near_weight;  // for each near point, by element: irradiance per radiosity
+  };
+  struct LitPatch {
+    const Link* link;
+    std::size_t first_bright, last_bright;
+    glm::vec3 centroid, normal;  // of the light
+    glm::vec3 flux;              // reflected [lm], over pi
+  };
+  glm::vec3 exposed_middle(int slot, glm::vec3 normal) const;
+  void link(int slot);
+  void link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points) const;
+  void link_near(Link& link, int slot, glm::vec3 normal) const;
+  LitPatch lit_patch(const std::vector<BrightElement>& bright, std::size_t first, std::size_t last) const;
+
+  const LightMesh& mesh_;
+  const RayScene& rays_;
+  std::size_t point_count_;
+  std::vector<float> x_, y_, z_, nx_, ny_, nz_;  // of the points, padded to whole blocks
+  std::vector<Link> links_;                      // by slot
+  std::size_t byte_count_ = 0;
+};
+
+}  // namespace transom

@@ -1,0 +1,54 @@
+/// @file What a camera sees that no condition changes: surfaces, the nodes that speak for them, edges of surfaces.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "transom/engine.h"
+#include "transom/transfer.h"
+#include "transom/view.h"
+
+namespace transom {
+
+/// A point at which beams are tested.
+struct BeamPoint {
+  glm::vec3 position{0};  ///< lifted
+  glm::vec3 normal{0};    ///< shading normal of the side seen
+  int surface = -1;       ///< face * 2 + side; -1: nothing
+  float weight = 0;       ///< of the pixel's light: share of the pixel times the transmittance up to the point
+  int pixel = 0;
+  int sample = 0;  ///< of the pixel: row of samples * edge_samples + column
+};
+
+/// The samples of a picture. Pixels without an edge of a surface have one, at their centre; the others
+/// edge_samples^2, all of whose light is summed beforehand as weights.
+struct ViewSamples {
+  ViewSamples(const Engine& engine, const View& view, int edge_samples);
+
+  View view;
+  int edge_samples;
+  std::vector<char> has_edge;       ///< by pixel: an edge of a surface
+  std::vector<BeamPoint> centre;    ///< by pixel: the surface at its centre
+  std::vector<BeamPoint> fine;      ///< all samples of pixels with an edge
+  std::vector<BeamPoint> on_panes;  ///< room sides of openings in front of either
+  SparseRows smooth;                ///< by pixel: shares of what Engine::shown_radiance lists
+
+  /// Light that no condition changes [cd/m²]: of point sources, and of emitters indoors and behind openings.
+  struct Constant {
+    int pixel;
+    glm::vec3 lamps, emitted, emitted_outdoors;
+  };
+  std::vector<Constant> constant;
+
+  /// Directions in which the sky or the ground is seen.
+  struct Outlook {
+    int pixel;
+    float weight;
+    glm::vec3 direction;
+  };
+  std::vector<Outlook> outlooks;
+  int edge_pixel_count = 0;
+};
+
+}  // namespace transom

@@ -1,0 +1,174 @@
+// Which sides of cells take part in the exchange of light, and which of them lie indoors.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <sstream>
+
+#include "streams.h"
+#include "transom/engine.h"
+#include "transom/error.h"
+#include "transom/parallel.h"
+#include "transom/sampling.h"
+#include "transom/survey.h"
+
+namespace transom {
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+constexpr std::size_t kGrain = 8;
+constexpr double kLeakTolerance = 2e-4;  // share of interior rays that may slip through the rounding of edges
+
+}  // namespace
+
+// The slots from which the search for patches starts: the room sides of openings, and emitters.
+std::vector<int> Engine::first_slots() const {
+  std::vector<int> slots;
+  for (std::size_t f = 0; f < faces_.faces.size(); ++f) {
+    const int face = static_cast<int>(f);
+    const Material& material = scene_.materials[faces_.faces[f].material];
+    const bool is_emitter = material.luminance != glm::vec3(0);
+    for (Side side = 0; side < 2; ++side) {
+      if (material.opening >= 0 ? side == 0 : (!is_emitter || faces_.is_inside_solid(face, side))) continue;
+      for (int cell = 0; cell < mesh_->grid(face).cell_count(); ++cell)
+        slots.push_back(mesh_->slot_index(face, side, cell));
+    }
+  }
+  return slots;
+}
+
+// Where the search for patches starts: first_slots, and what point sources light.
+std::vector<int> Engine::first_wave() const {
+  const int per_slot = mesh_->elements_per_slot();
+  std::vector<int> wave = first_slots();
+  for (std::size_t i = 0; i < scene_.point_sources.size(); ++i) {
+    const SobolSequence points(hash_seed(options_.seed, kSourceStream + i));
+    std::vector<Ray> rays;
+    for (int k = 0; k < options_.node_samples.hemisphere; ++k) {
+      const glm::vec2 u = points.point2(static_cast<std::uint32_t>(k));
+      const float z = 1 - 2 * u.x, r = std::sqrt(std::max(0.f, 1 - z * z));
+      rays.push_back({glm::vec3(scene_.point_sources[i].position - faces_.origin),
+                      {r * std::cos(2 * kPi * u.y), r * std::sin(2 * kPi * u.y), z}});
+    }
+    std::vector<Hit> hits(rays.size());
+    rays_->intersect(RayScene::What::kAll, rays, hits);
+    for (const Hit& hit : hits)
+      if (hit.face >= 0 && !faces_.is_inside_solid(hit.face, hit.side))
+        wave.push_back(mesh_->element_at(hit) / per_slot);
+  }
+  std::sort(wave.begin(), wave.end());
+  wave.erase(std::unique(wave.begin(), wave.end()), wave.end());
+  return wave;
+}
+
+// Rows wave by wave: what a patch sees becomes a patch in the next wave, until nothing new is seen.
+void Engine::find_patches(std::vector<int> wave, std::vector<GatherRow>& rows) {
+  const int per_slot = mesh_->elements_per_slot();
+  while (!wave.empty()) {
+    for (const int slot : wave) {
+      patch_of_slot_[slot] = static_cast<int>(slot_of_patch_.size());
+      slot_of_patch_.push_back(slot);
+    }
+    const std::size_t base = rows.size();
+    rows.resize(base + wave.size());
+    parallel_indices(wave.size(), kGrain, [&](std::size_t i) {
+      const std::uint32_t seed = hash_seed(options_.seed, hash_seed(kPatchStream, static_cast<std::uint64_t>(wave[i])));
+      rows[base + i] = gatherer_->gather_over_patch(wave[i], options_.patch_samples, seed);
+    });
+    std::vector<int> next;
+    for (std::size_t i = base; i < rows.size(); ++i)
+      for (const std::vector<Share>* shares : {&rows[i].reached, &rows[i].through})
+        for (const Share& share : *shares)
+          if (patch_of_slot_[share.index / per_slot] < 0) next.push_back(share.index / per_slot);
+    std::sort(next.begin(), next.end());
+    next.erase(std::unique(next.begin(), next.end()), next.end());
+    wave = std::move(next);
+  }
+}
+
+// Slots that see patches indoors without having been seen by them: then those are indoors, too.
+void Engine::find_unseen_patches(std::vector<GatherRow>& rows) {
+  for (std::uint64_t round = 0;; ++round) {
+    std::vector<char> is_interior(patch_of_slot_.size(), 0);
+    for (std::size_t p = 0; p < rows.size(); ++p) is_interior[slot_of_patch_[p]] = is_interior_[p];
+    const std::vector<int> unseen =
+        slots_that_see(is_interior, patch_of_slot_, *mesh_, *rays_, hash_seed(options_.seed, kUnseenStream + round));
+    if (unseen.empty()) return;
+    find_patches(unseen, rows);
+    unseen_slots_.insert(unseen_slots_.end(), unseen.begin(), unseen.end());
+    mark_interior(rows);
+  }
+}
+
+void Engine::mark_interior(const std::vector<GatherRow>& rows) {
+  is_interior_.assign(rows.size(), 0);
+  std::vector<int> stack;
+  const auto mark = [&](int patch) {
+    if (patch < 0 || is_interior_[patch]) return;
+    is_interior_[patch] = 1;
+    stack.push_back(patch);
+  };
+  // An emitter that sees the sky is a lamp outdoors, or the outside of a luminous wall.
+  for (const int slot : first_slots())
+    if (scene_.materials[faces_.faces[mesh_->slot(slot).face].material].opening >= 0 ||
+        rows[patch_of_slot_[slot]].escaped == 0)
+      mark(patch_of_slot_[slot]);
+  // What an opening sees is indoors, however small it is itself.
+  const auto patch_at = [&](const Share& share) { return patch_of_slot_[share.index / mesh_->elements_per_slot()]; };
+  for (const int patch : std::vector<int>(stack))
+    for (const Share& share : rows[patch].reached) mark(patch_at(share));
+  for (const int slot : unseen_slots_) mark(patch_of_slot_[slot]);
+  if (!scene_.point_sources.empty())
+    for (std::size_t p = 0; p < rows.size(); ++p) mark(static_cast<int>(p));
+  // What a patch indoors sees is indoors if it sees a patch indoors itself. One ray that slips through an edge, between
+  // slivers, meets the outside of a wall, which does not look back.
+  std::vector<int> pending;
+  while (!stack.empty()) {
+    const int patch = stack.back();
+    stack.pop_back();
+    for (const Share& share : rows[patch].reached)
+      if (patch_at(share) >= 0 && !is_interior_[patch_at(share)]) pending.push_back(patch_at(share));
+    if (!stack.empty()) continue;
+    std::sort(pending.begin(), pending.end());
+    pending.erase(std::unique(pending.begin(), pending.end()), pending.end());
+    std::erase_if(pending, [&](int other) {
+      const std::vector<Share>& seen = rows[other].reached;
+      if (std::none_of(seen.begin(), seen.end(),
+                       [&](const Share& share) { return patch_at(share) >= 0 && is_interior_[patch_at(share)]; }))
+        return false;
+      mark(other);
+      return true;
+    });
+  }
+  facts_.interior_patch_count = static_cast<int>(std::count(is_interior_.begin(), is_interior_.end(), 1));
+}
+
+void Engine::check_closed(const std::vector<GatherRow>& rows) {
+  double escaped = 0, total = 0, worst = 0;
+  std::size_t worst_patch = 0;
+  for (std::size_t p = 0; p < rows.size(); ++p) {
+    if (!is_interior_[p]) continue;
+    escaped += rows[p].escaped;
+    total += 1;
+    if (rows[p].escaped > worst) worst = rows[worst_patch = p].escaped;
+  }
+  facts_.leak_share = total > 0 ? escaped / total : 0;
+  if (facts_.leak_share <= kLeakTolerance) return;
+  const Slot slot = mesh_->slot(slot_of_patch_[worst_patch]);
+  const glm::dvec3 place =
+      faces_.origin + glm::dvec3(mesh_->lifted_position(
+                          slot.face, slot.side, mesh_->cell_parameters(slot.face, slot.cell, glm::vec2(1.f / 3))));
+  std::ostringstream text;
+  text.precision(3);
+  if (scene_.materials[faces_.faces[slot.face].material].opening >= 0)
+    text << "face " << faces_.faces[slot.face].source << ", an opening, looks the wrong way near (" << std::fixed
+         << place.x << ", " << place.y << ", " << place.z << ") m: " << 100 * worst
+         << " % of the rays from its back leave the building. Turn its front outdoors";
+  else
+    text << "open wall: " << 100 * facts_.leak_share
+         << " % of the rays in the room leave it without passing an opening, most near (" << std::fixed << place.x
+         << ", " << place.y << ", " << place.z << ") m, face " << faces_.faces[slot.face].source
+         << ". Close the gap, or declare it as an opening with glazing = \"none\"";
+  throw InputError(text.str());
+}
+
+}  // namespace transom

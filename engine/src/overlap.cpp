@@ -1,0 +1,133 @@
+#include "transom/overlap.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <sstream>
+
+#include "transom/error.h"
+#include "transom/sampling.h"
+
+namespace transom {
+namespace {
+
+constexpr float kParallelCosine = 0.99999f;  // of the normals of faces in one plane
+constexpr double kLeastShare = 1e-3;         // of the smaller face's area: less is the rounding of neighbours
+constexpr double kLeastExtent2 = 1e-5;       // of the scene's extent squared: a strip as wide as the lift of rays
+constexpr std::uint32_t kRayCount = 16;
+constexpr std::uint32_t kSeed = 1;  // of a check: the same scene is always right or wrong
+
+struct Box {
+  glm::vec3 low, high;
+};
+
+int corner_count(const Face& face) {
+  return face.is_quad ? 4 : 3;
+}
+
+Box box_of(const Face& face, float margin) {
+  Box box{face.corner[0], face.corner[0]};
+  for (int k = 1; k < corner_count(face); ++k) {
+    box.low = glm::min(box.low, face.corner[k]);
+    box.high = glm::max(box.high, face.corner[k]);
+  }
+  return {box.low - margin, box.high + margin};
+}
+
+// Area and middle of the part of a face that lies over another, projected along the other's normal [Sutherland &
+// Hodgman 1974].
+double overlap_area(const Face& face, const Face& other, glm::dvec3& middle) {
+  std::vector<glm::dvec3> polygon, clipped;
+  for (int k = 0; k < corner_count(face); ++k) polygon.emplace_back(face.corner[k]);
+  const glm::dvec3 normal(other.normal);
+  const int count = corner_count(other);
+  for (int k = 0; k < count && !polygon.empty(); ++k) {
+    const glm::dvec3 a(other.corner[k]), inward = glm::cross(normal, glm::dvec3(other.corner[(k + 1) % count]) - a);
+    clipped.clear();
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const glm::dvec3 p = polygon[i], q = polygon[(i + 1) % polygon.size()];
+      const double at_p = glm::dot(p - a, inward), at_q = glm::dot(q - a, inward);
+      if (at_p >= 0) clipped.push_back(p);
+      if ((at_p > 0 && at_q < 0) || (at_p < 0 && at_q > 0)) clipped.push_back(glm::mix(p, q, at_p / (at_p - at_q)));
+    }
+    polygon.swap(clipped);
+  }
+  if (polygon.size() < 3) return 0;
+  glm::dvec3 twice_area(0);
+  middle = polygon[0] + polygon[1];
+  for (std::size_t i = 2; i < polygon.size(); ++i) {
+    twice_area += glm::cross(polygon[i - 1] - polygon[0], polygon[i] - polygon[0]);
+    middle += polygon[i];
+  }
+  middle /= static_cast<double>(polygon.size());
+  return 0.5 * glm::length(twice_area);
+}
+
+// Whether a place between two faces that lie on each other sees a lit side indoors, to the front or the back of one.
+bool is_lit(const Faces& faces, const std::vector<char>& is_indoors, const RayScene& rays, glm::vec3 place,
+            glm::vec3 normal) {
+  const SobolSequence points(kSeed);
+  for (const glm::vec3 up : {normal, -normal}) {
+    Ray own[kRayCount];
+    Hit hits[kRayCount];
+    for (std::uint32_t k = 0; k < kRayCount; ++k)
+      own[k] = {place + 2 * faces.ray_offset() * up,
+                frame_from_normal(up) * sample_cosine_hemisphere(points.point2(k))};
+    rays.intersect(RayScene::What::kAll, own, hits);
+    bool is_buried = false, sees_light = false;
+    for (const Hit& hit : hits) {
+      if (hit.face < 0) continue;
+      is_buried |= faces.is_inside_solid(hit.face, hit.side);
+      sees_light |= (is_indoors[hit.face] >> hit.side & 1) != 0;
+    }
+    if (sees_light && !is_buried) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+void check_overlaps(const Faces& faces, const std::vector<char>& is_indoors, const RayScene& rays) {
+  const float margin = faces.ray_offset();
+  const std::size_t count = faces.faces.size();
+  std::vector<Box> boxes;
+  boxes.reserve(count);
+  for (const Face& face : faces.faces) boxes.push_back(box_of(face, 0.5f * margin));
+  std::vector<int> order(count);
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return boxes[a].low.x < boxes[b].low.x; });
+  std::vector<int> open;  // faces whose boxes reach the present one
+  for (const int b : order) {
+    std::erase_if(open, [&](int a) { return boxes[a].high.x < boxes[b].low.x; });
+    for (const int a : open) {
+      const Face &first = faces.faces[a], &second = faces.faces[b];
+      if (first.source == second.source || !(is_indoors[a] || is_indoors[b])) continue;
+      if (glm::any(glm::greaterThan(boxes[a].low, boxes[b].high)) ||
+          glm::any(glm::greaterThan(boxes[b].low, boxes[a].high)) ||
+          std::abs(glm::dot(first.normal, second.normal)) < kParallelCosine)
+        continue;
+      const auto off_plane = [&](glm::vec3 p) { return std::abs(glm::dot(p - first.corner[0], first.normal)); };
+      const float distance = std::max({off_plane(second.corner[0]), off_plane(second.corner[1]),
+                                       off_plane(second.corner[corner_count(second) - 1])});
+      if (distance > margin) continue;
+      glm::dvec3 middle(0);
+      const double area = overlap_area(second, first, middle);
+      if (area <=
+          std::max(kLeastShare * std::min(first.area, second.area), kLeastExtent2 * faces.extent * faces.extent))
+        continue;
+      if (!is_lit(faces, is_indoors, rays, glm::vec3(middle), first.normal)) continue;
+      middle += faces.origin;
+      const auto [low, high] = std::minmax(first.source, second.source);
+      std::ostringstream text;
+      text.precision(3);
+      text << "face " << high << ", lies in the plane of face " << low << ", and on " << area << " m² of it, near ("
+           << middle.x << ", " << middle.y << ", " << middle.z
+           << ") m: which of the two light meets would be chance. Delete one of them, cut a hole, or move it off by "
+           << 2 * margin << " m";
+      throw InputError(text.str());
+    }
+    open.push_back(b);
+  }
+}
+
+}  // namespace transom

@@ -1,0 +1,250 @@
+#include "transom/point_links.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "transom/parallel.h"
+
+namespace transom {
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+constexpr float kFar = 4;  // diameters from which a patch counts as a point: then it errs by about 1 % of its share
+constexpr std::size_t kMemory = 512u << 20;  // for links [bytes]
+constexpr float kLeastDistance2 = 1e-15f;    // keeps 0 / 0 out of weights that are 0; its square is a normal number
+constexpr std::size_t kBlocksAtOnce = 8;
+
+// Shares of light that arrive at the end of segments: 0 behind something opaque, else the transmittance on the way.
+void seen_shares(const RayScene& rays, const std::vector<Ray>& segments, std::vector<float>& shares) {
+  std::vector<std::uint8_t> is_stopped(segments.size());
+  rays.occluded(RayScene::What::kOpaque, segments, is_stopped, RayScene::Order::kCoherent);
+  shares.resize(segments.size());
+  for (std::size_t k = 0; k < segments.size(); ++k) shares[k] = is_stopped[k] ? 0.f : 1.f;
+  if (!rays.has_openings()) return;
+  rays.occluded(RayScene::What::kOpenings, segments, is_stopped, RayScene::Order::kCoherent);
+  std::vector<Ray> through;
+  std::vector<std::size_t> index;
+  for (std::size_t k = 0; k < segments.size(); ++k)
+    if (is_stopped[k] && shares[k] > 0) {
+      through.push_back(segments[k]);
+      index.push_back(k);
+    }
+  std::vector<float> transmitted(through.size());
+  rays.transmittance(through, transmitted);
+  for (std::size_t k = 0; k < through.size(); ++k) shares[index[k]] = transmitted[k];
+}
+
+}  // namespace
+
+PointLinks::PointLinks(const LightMesh& mesh, const RayScene& rays, const std::vector<Node>& points)
+    : mesh_(mesh), rays_(rays), point_count_(points.size()), links_(static_cast<std::size_t>(mesh.slot_count())) {
+  const std::size_t padded = (points.size() + kBlock - 1) / kBlock * kBlock;
+  for (std::vector<float>* list : {&x_, &y_, &z_, &nx_, &ny_, &nz_}) list->assign(padded, 0.f);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    x_[i] = points[i].position.x;
+    y_[i] = points[i].position.y;
+    z_[i] = points[i].position.z;
+    nx_[i] = points[i].normal.x;
+    ny_[i] = points[i].normal.y;
+    nz_[i] = points[i].normal.z;
+  }
+}
+
+// The middle of the elements of a patch that do not lie inside a solid, moved to the nearest of their own middles.
+glm::vec3 PointLinks::exposed_middle(int slot_index, glm::vec3 normal) const {
+  const int element_count = mesh_.elements_per_slot();
+  std::vector<Ray> outwards;
+  for (int e = 0; e < element_count; ++e)
+    outwards.push_back({element_shape(mesh_, slot_index * element_count + e).middle, normal});
+  std::vector<Hit> hits(outwards.size());
+  rays_.intersect(RayScene::What::kOpaque, outwards, hits, RayScene::Order::kCoherent);
+  glm::vec3 sum(0), all(0);
+  int count = 0;
+  for (std::size_t e = 0; e < outwards.size(); ++e) {
+    all += outwards[e].origin;
+    if (hits[e].face >= 0 && mesh_.faces().is_inside_solid(hits[e].face, hits[e].side)) continue;
+    sum += outwards[e].origin;
+    outwards[static_cast<std::size_t>(count++)] = outwards[e];
+  }
+  if (count == 0 || count == element_count) return all / static_cast<float>(element_count);
+  sum /= static_cast<float>(count);
+  return std::min_element(
+             outwards.begin(), outwards.begin() + count,
+             [&](const Ray& a, const Ray& b) { return glm::length(a.origin - sum) < glm::length(b.origin - sum); })
+      ->origin;
+}
+
+void PointLinks::link(int slot_index) {
+  const Slot slot = mesh_.slot(slot_index);
+  const Face& face = mesh_.faces().faces[slot.face];
+  const glm::vec3 normal = slot.side == 0 ? face.normal : -face.normal, middle = exposed_middle(slot_index, normal);
+  const float size2 = 2 * mesh_.cell_area(slot.face, slot.cell), size = std::sqrt(size2);
+  Link& link = links_[slot_index];
+  std::vector<int> far_points;
+  std::vector<float> height(kBlock), distance2(kBlock), cosine(kBlock);
+  for (std::size_t begin = 0; begin < x_.size(); begin += kBlock) {
+    bool any = false;
+    for (std::size_t k = 0; k < kBlock; ++k) {
+      const float dx = middle.x - x_[begin + k], dy = middle.y - y_[begin + k], dz = middle.z - z_[begin + k];
+      height[k] = -(dx * normal.x + dy * normal.y + dz * normal.z);
+      cosine[k] = dx * nx_[begin + k] + dy * ny_[begin + k] + dz * nz_[begin + k];
+      distance2[k] = dx * dx + dy * dy + dz * dz;
+      any |= height[k] > 0 && cosine[k] > -size;
+    }
+    if (!any) continue;
+    for (std::size_t k = 0; k < kBlock && begin + k < point_count_; ++k)
+      if (height[k] > 0 && cosine[k] > -size)
+        (distance2[k] > kFar * kFar * size2 ? far_points : link.near_point).push_back(static_cast<int>(begin + k));
+  }
+  link_far(link, middle, far_points);
+  link_near(link, slot_index, normal);
+  link.is_ready = true;
+}
+
+void PointLinks::link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points) const {
+  std::vector<Ray> segments;
+  for (const int i : far_points) segments.push_back({middle, glm::vec3(x_[i], y_[i], z_[i]) - middle, 0, 1});
+  std::vector<float> shares;
+  seen_shares(rays_, segments, shares);
+  for (std::size_t k = 0; k < far_points.size(); ++k) {
+    if (shares[k] <= 0) continue;
+    const int block = far_points[k] / static_cast<int>(kBlock);
+    if (link.block.empty() || link.block.back() != block) {
+      link.block.push_back(block);
+      link.seen.resize(link.seen.size() + kBlock, 0);
+    }
+    link.seen[link.seen.size() - kBlock + far_points[k] % static_cast<int>(kBlock)] =
+        static_cast<std::uint8_t>(std::lround(255 * std::sqrt(shares[k])));
+  }
+}
+
+void PointLinks::link_near(Link& link, int slot, glm::vec3 normal) const {
+  const int element_count = mesh_.elements_per_slot();
+  std::vector<ElementShape> shapes;
+  for (int e = 0; e < element_count; ++e) shapes.push_back(element_shape(mesh_, slot * element_count + e));
+  std::vector<Ray> segments;
+  std::vector<float> weights, shares;
+  std::vector<int> kept;
+  for (const int i : link.near_point) {
+    const glm::vec3 point(x_[i], y_[i], z_[i]), point_normal(nx_[i], ny_[i], nz_[i]);
+    bool any = false;
+    for (const ElementShape& shape : shapes) {
+      weights.push_back(element_share(point, point_normal, shape, normal));
+      any |= weights.back() > 0;
+    }
+    if (!any) {
+      weights.resize(weights.size() - shapes.size());
+      continue;
+    }
+    kept.push_back(i);
+    for (const ElementShape& shape : shapes) segments.push_back({point, shape.middle - point, 0, 1});
+  }
+  seen_shares(rays_, segments, shares);
+  for (std::size_t k = 0; k < weights.size(); ++k) weights[k] *= shares[k];
+  link.near_point = std::move(kept);
+  link.near_weight = std::move(weights);
+}
+
+void PointLinks::prepare(const std::vector<int>& slots) {
+  std::vector<int> missing;
+  for (const int slot : slots)
+    if (!links_[slot].is_ready) missing.push_back(slot);
+  constexpr std::size_t kBatch = 256;  // of patches, after which the memory is looked at
+  for (std::size_t begin = 0; begin < missing.size() && byte_count_ < kMemory; begin += kBatch) {
+    const std::size_t end = std::min(missing.size(), begin + kBatch);
+    parallel_indices(end - begin, 1, [&](std::size_t k) { link(missing[begin + k]); });
+    for (std::size_t k = begin; k < end; ++k) {
+      const Link& made = links_[missing[k]];
+      byte_count_ += sizeof(int) * (made.block.size() + made.near_point.size()) + made.seen.size() +
+                     sizeof(float) * made.near_weight.size();
+    }
+  }
+}
+
+PointLinks::LitPatch PointLinks::lit_patch(const std::vector<BrightElement>& bright, std::size_t first,
+                                           std::size_t last) const {
+  const int per_slot = mesh_.elements_per_slot(), slot_index = bright[first].element / per_slot;
+  const Slot slot = mesh_.slot(slot_index);
+  const Face& face = mesh_.faces().faces[slot.face];
+  const glm::vec2 middle = mesh_.grid(slot.face).is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3);
+  LitPatch patch{&links_[slot_index], first, last, glm::vec3(0), slot.side == 0 ? face.normal : -face.normal,
+                 glm::vec3(0)};
+  float sum = 0;
+  for (std::size_t k = first; k < last; ++k) {
+    const int element = bright[k].element % per_slot;
+    const float area = mesh_.element_area(slot.face, slot.cell, element);
+    const glm::vec3 radiosity = bright[k].radiosity;
+    const float weight = area * (radiosity.x + radiosity.y + radiosity.z);
+    patch.centroid += weight * mesh_.lifted_position(slot.face, slot.side,
+                                                     mesh_.element_parameters(slot.face, slot.cell, element, middle));
+    patch.flux += area / kPi * radiosity;
+    sum += weight;
+  }
+  if (sum > 0) patch.centroid /= sum;
+  return patch;
+}
+
+void PointLinks::add_irradiance(const std::vector<BrightElement>& bright, std::vector<glm::vec3>& irradiance) {
+  const int per_slot = mesh_.elements_per_slot();
+  std::vector<int> slots;
+  for (const BrightElement& b : bright)
+    if (slots.empty() || slots.back() != b.element / per_slot) slots.push_back(b.element / per_slot);
+  // Without room for more, what other conditions needed is given up.
+  if (byte_count_ >= kMemory) {
+    std::fill(links_.begin(), links_.end(), Link{});
+    byte_count_ = 0;
+  }
+  for (const int slot : slots)
+    if (!links_[slot].is_ready) {
+      prepare(slots);
+      break;
+    }
+  std::vector<LitPatch> lit(slots.size());
+  std::vector<std::size_t> first{0};
+  for (std::size_t k = 1; k <= bright.size(); ++k)
+    if (k == bright.size() || bright[k].element / per_slot != bright[k - 1].element / per_slot) first.push_back(k);
+  parallel_indices(slots.size(), 16, [&](std::size_t k) { lit[k] = lit_patch(bright, first[k], first[k + 1]); });
+
+  const std::size_t block_count = x_.size() / kBlock;
+  parallel_indices((block_count + kBlocksAtOnce - 1) / kBlocksAtOnce, 1, [&](std::size_t chunk) {
+    const std::size_t first_block = chunk * kBlocksAtOnce,
+                      last_block = std::min(block_count, first_block + kBlocksAtOnce), base = first_block * kBlock;
+    float red[kBlocksAtOnce * kBlock] = {}, green[kBlocksAtOnce * kBlock] = {}, blue[kBlocksAtOnce * kBlock] = {};
+    for (const LitPatch& patch : lit) {
+      const Link& link = *patch.link;
+      const glm::vec3 c = patch.centroid, m = patch.normal, flux = patch.flux;
+      auto block = std::lower_bound(link.block.begin(), link.block.end(), static_cast<int>(first_block));
+      for (; block != link.block.end() && *block < static_cast<int>(last_block); ++block) {
+        const std::uint8_t* seen = &link.seen[static_cast<std::size_t>(block - link.block.begin()) * kBlock];
+        const std::size_t from = static_cast<std::size_t>(*block) * kBlock, to = from - base;
+        for (std::size_t k = 0; k < kBlock; ++k) {
+          const float dx = c.x - x_[from + k], dy = c.y - y_[from + k], dz = c.z - z_[from + k];
+          const float height = std::max(0.f, -(dx * m.x + dy * m.y + dz * m.z));
+          const float cosine = std::max(0.f, dx * nx_[from + k] + dy * ny_[from + k] + dz * nz_[from + k]);
+          const float distance2 = std::max(kLeastDistance2, dx * dx + dy * dy + dz * dz);
+          const float root = static_cast<float>(static_cast<int>(seen[k])) * (1.f / 255);
+          const float weight = height * cosine * root * root / (distance2 * distance2);
+          red[to + k] += weight * flux.x;
+          green[to + k] += weight * flux.y;
+          blue[to + k] += weight * flux.z;
+        }
+      }
+      auto near = std::lower_bound(link.near_point.begin(), link.near_point.end(), static_cast<int>(base));
+      for (; near != link.near_point.end() && *near < static_cast<int>(last_block * kBlock); ++near) {
+        const float* weight = &link.near_weight[static_cast<std::size_t>(near - link.near_point.begin()) * per_slot];
+        glm::vec3 sum(0);
+        for (std::size_t k = patch.first_bright; k < patch.last_bright; ++k)
+          sum += weight[bright[k].element % per_slot] * bright[k].radiosity;
+        const std::size_t to = static_cast<std::size_t>(*near) - base;
+        red[to] += sum.x;
+        green[to] += sum.y;
+        blue[to] += sum.z;
+      }
+    }
+    const std::size_t count = std::min(point_count_, last_block * kBlock) - base;
+    for (std::size_t k = 0; k < count; ++k) irradiance[base + k] += glm::vec3(red[k], green[k], blue[k]);
+  });
+}
+
+}  // namespace transom

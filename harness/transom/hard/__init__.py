@@ -1,0 +1,1 @@
+"""Hard cases: rooms, suns and cameras at the limits of the numbers, each with claims that must hold."""

@@ -1,0 +1,132 @@
+// Scenes at the limits: what covers, what is tiny, what is thin, what is not a number.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "rooms.h"
+#include "transom/engine.h"
+#include "transom/error.h"
+#include "transom/frame.h"
+
+namespace transom {
+namespace {
+
+using test::add_box;
+using test::add_quad;
+using test::diffuse;
+using test::roof_light_room;
+using test::tregenza;
+using test::uniform_sky;
+
+SolveOptions small_options() {
+  SolveOptions options;
+  options.target_patch_count = 300;
+  options.patch_samples = {256, 128};
+  options.node_samples = {64, 64};
+  return options;
+}
+
+double imbalance(const SceneGeometry& scene, glm::vec3 to_sun) {
+  Engine engine(scene, tregenza(), small_options());
+  Condition condition = uniform_sky(1000);
+  condition.beams.push_back({glm::normalize(to_sun), glm::vec3(60000)});
+  engine.relight(condition);
+  const EnergyAudit audit = engine.audit(1 << 14);
+  EXPECT_GT(audit.in_beams.y, 0);
+  return (audit.absorbed + audit.out).y / audit.in().y - 1;
+}
+
+std::string error_of(const SceneGeometry& scene) {
+  try {
+    Engine engine(scene, tregenza(), small_options());
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+// The room of rooms.h with a square hole of another size.
+SceneGeometry room_with_hole(double side) {
+  SceneGeometry scene = roof_light_room(0.5f);
+  for (glm::dvec3& v : scene.vertices)
+    if (v.x > 0.5 && v.x < 3.5 && v.y > 0.5 && v.y < 3.5)
+      v = {2 + (v.x > 2 ? 0.5 : -0.5) * side, 2 + (v.y > 2 ? 0.5 : -0.5) * side, v.z};
+  return scene;
+}
+
+TEST(Overlap, SheetOnTheFloorIsRefusedByNameAndOneAboveItIsNot) {
+  for (const double height : {0.0, 1e-6, 2e-5}) {
+    SceneGeometry scene = roof_light_room(0.5f);
+    add_quad(scene, {1, 1, height}, {2, 1, height}, {2, 2, height}, {1, 2, height}, 0);
+    EXPECT_NE(error_of(scene).find("face 10, lies in the plane of face 0"), std::string::npos) << error_of(scene);
+  }
+  SceneGeometry scene = roof_light_room(0.5f);
+  add_quad(scene, {1, 1, 1e-3}, {2, 1, 1e-3}, {2, 2, 1e-3}, {1, 2, 1e-3}, 0);
+  EXPECT_EQ(error_of(scene), "");
+  EXPECT_NEAR(imbalance(scene, {0.1f, 0.2f, 1}), 0, 0.01);
+}
+
+TEST(Overlap, BoxOnTheFloorAndInACornerCoversWhatItStandsOn) {
+  for (const glm::dvec3 low : {glm::dvec3(1, 1, 0), glm::dvec3(0, 0, 0)}) {
+    SceneGeometry scene = roof_light_room(0.5f);
+    add_box(scene, low, low + glm::dvec3(1, 1, 0.7), 0);
+    EXPECT_EQ(error_of(scene), "");
+    EXPECT_NEAR(imbalance(scene, {0.1f, 0.2f, 1}), 0, 0.01);
+  }
+}
+
+TEST(Faces, BoxThatTouchesAnotherAtAVertexIsSolid) {
+  SceneGeometry scene;
+  scene.materials = {diffuse(0.5f)};
+  add_box(scene, {0, 0, 0}, {1, 1, 1}, 0);
+  add_box(scene, {1, 1, 1}, {2, 2, 2}, 0, true);
+  const Faces faces = make_faces(scene);
+  EXPECT_TRUE(faces.is_inside_solid(0, 1));
+  EXPECT_FALSE(faces.is_inside_solid(6, 1));
+}
+
+TEST(SmallOpening, LetsItsSunInWhateverItsSize) {
+  for (const double side : {1e-3, 1e-2, 0.1, 0.5})
+    EXPECT_NEAR(imbalance(room_with_hole(side), {0.2f, 0.1f, 1}), 0, 0.01) << side << " m";
+}
+
+TEST(ThinBlades, AThousandOfThemLoseNoLight) {
+  SceneGeometry scene = roof_light_room(0.5f);
+  for (int k = 0; k < 1000; ++k) {
+    const double x = 1 + 2 * (k + 0.5) / 1000;
+    add_quad(scene, {x, 1, 2.99}, {x, 3, 2.99}, {x, 3, 2.9885}, {x, 1, 2.9885}, 0);
+  }
+  EXPECT_NEAR(imbalance(scene, {0.2f, 0.1f, 1}), 0, 0.02);
+}
+
+TEST(Condition, LightThatIsNoNumberIsRefusedAndTheOldOneStays) {
+  Engine engine(roof_light_room(0.5f), tregenza(), small_options());
+  engine.relight(uniform_sky(1000));
+  const std::vector<glm::vec3> before = engine.lighting().patch_irradiance;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  Condition sky = uniform_sky(1000), colour = uniform_sky(1000), direction = uniform_sky(1000),
+            picture = uniform_sky(1000);
+  sky.sky_luminance[7] = nan;
+  colour.sky_colour.x = std::numeric_limits<float>::infinity();
+  direction.beams.push_back({glm::vec3(nan), glm::vec3(1)});
+  picture.picture.assign(2, glm::vec3(nan));
+  picture.picture_width = 2;
+  picture.picture_height = 1;
+  for (const Condition& bad : {sky, colour, direction, picture}) {
+    EXPECT_THROW(engine.relight(bad), InputError);
+    EXPECT_EQ(engine.lighting().patch_irradiance, before);
+  }
+}
+
+TEST(View, PlaceThatIsNoNumberIsRefused) {
+  View view;
+  view.position = glm::dvec3(std::numeric_limits<double>::quiet_NaN());
+  view.target = {1, 0, 0};
+  view.width = view.height = 8;
+  EXPECT_THROW(view.validate(), InputError);
+}
+
+}  // namespace
+}  // namespace transom

@@ -1,0 +1,103 @@
+#include "transom/interreflection.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace transom {
+namespace {
+
+// Patches on a line that exchange light with all others, more with their neighbours; rows sum to 1.
+struct Chain {
+  SparseRows form_factors, through;
+  std::vector<glm::vec3> reflectance, emitted, direct;
+  std::vector<float> areas;
+  std::vector<PatchPlace> places;
+
+  explicit Chain(int count) {
+    for (int i = 0; i < count; ++i) {
+      std::vector<Share> row;
+      float sum = 0;
+      for (int j = 0; j < count; ++j)
+        if (j != i) sum += 1 / (1.f + static_cast<float>((i - j) * (i - j)));
+      for (int j = 0; j < count; ++j)
+        if (j != i) row.push_back({j, 1 / (1.f + static_cast<float>((i - j) * (i - j))) / sum});
+      form_factors.append(row);
+      through.append({});
+      reflectance.push_back({0.8f, 0.5f, 0.2f + 0.6f * static_cast<float>(i % 3) / 2});
+      emitted.push_back(glm::vec3(i == 0 ? 100.f : 0.f));
+      direct.push_back(glm::vec3(static_cast<float>(i % 5), 1, 0));
+      areas.push_back(1);
+      places.push_back({{0.1f * static_cast<float>(i), 0, 0}, {0, 0, i % 2 ? 1.f : -1.f}});
+    }
+  }
+};
+
+// Irradiance by Gauss and Seidel's sweeps over the patches alone.
+std::vector<glm::vec3> swept(const Chain& chain, int sweeps) {
+  std::vector<glm::vec3> e = chain.direct, radiosity(e.size());
+  for (std::size_t i = 0; i < e.size(); ++i) radiosity[i] = chain.emitted[i] + chain.reflectance[i] * e[i];
+  for (int sweep = 0; sweep < sweeps; ++sweep)
+    for (std::size_t i = 0; i < e.size(); ++i) {
+      e[i] = chain.direct[i] + chain.form_factors.dot(i, radiosity);
+      radiosity[i] = chain.emitted[i] + chain.reflectance[i] * e[i];
+    }
+  return e;
+}
+
+TEST(Interreflection, TwoLevelsFindWhatSweepsFind) {
+  const Chain chain(600);
+  const Interreflection prepared(chain.form_factors, chain.through, chain.reflectance, chain.areas, chain.places);
+  EXPECT_LT(prepared.cluster_count(), 600);
+  std::vector<glm::vec3> e;
+  prepared.solve(chain.emitted, chain.direct, 1e-7, 1000, e);
+  const std::vector<glm::vec3> expected = swept(chain, 400);
+  for (std::size_t i = 0; i < e.size(); ++i)
+    for (int channel = 0; channel < 3; ++channel)
+      EXPECT_NEAR(e[i][channel], expected[i][channel], 1e-4 * expected[i][channel]) << i;
+}
+
+TEST(Interreflection, ConvergesWhereOneColourIsAlmostLossless) {
+  Chain chain(400);
+  for (glm::vec3& rho : chain.reflectance) rho = {0.99f, 0.98f, 0.6f};
+  const Interreflection prepared(chain.form_factors, chain.through, chain.reflectance, chain.areas, chain.places);
+  std::vector<glm::vec3> e;
+  EXPECT_LT(prepared.solve(std::vector<glm::vec3>(400, glm::vec3(1)), std::vector<glm::vec3>(400, glm::vec3(0)), 1e-6,
+                           20000, e),
+            2000);
+  EXPECT_NEAR(e[7].x, 1 / (1 - 0.99), 0.1);
+  EXPECT_NEAR(e[7].z, 1 / (1 - 0.6), 0.01);
+}
+
+TEST(Interreflection, ReflectanceActsBeforeTheOperatorAndNotAfter) {
+  // Two facing surfaces that see only each other: B1 = M1 + r1 E1, E1 = B2; B2 = r2 E2, E2 = B1.
+  SparseRows f, none;
+  f.append({{1, 1.f}});
+  f.append({{0, 1.f}});
+  none.append({});
+  none.append({});
+  const Interreflection prepared(f, none, {glm::vec3(0.2f), glm::vec3(0.8f)}, {1, 1},
+                                 {{{0, 0, 0}, {0, 0, 1}}, {{0, 0, 1}, {0, 0, -1}}});
+  std::vector<glm::vec3> e;
+  prepared.solve({glm::vec3(100), glm::vec3(0)}, {glm::vec3(0), glm::vec3(0)}, 1e-7, 100, e);
+  const double b1 = 100 / (1 - 0.2 * 0.8);
+  EXPECT_NEAR(e[1].x, b1, 1e-3);
+  EXPECT_NEAR(e[0].x, 0.8 * b1, 1e-3);
+}
+
+TEST(Interreflection, ARoomThatLosesNothingIsRefused) {
+  SparseRows f, none;
+  f.append({{1, 1.f}});
+  f.append({{0, 1.f}});
+  none.append({});
+  none.append({});
+  const Interreflection prepared(f, none, std::vector<glm::vec3>(2, glm::vec3(1)), {1, 1},
+                                 {{{0, 0, 0}, {0, 0, 1}}, {{0, 0, 1}, {0, 0, -1}}});
+  std::vector<glm::vec3> e;
+  EXPECT_THROW(
+      prepared.solve(std::vector<glm::vec3>(2, glm::vec3(1)), std::vector<glm::vec3>(2, glm::vec3(0)), 1e-9, 50, e),
+      std::runtime_error);
+}
+
+}  // namespace
+}  // namespace transom
