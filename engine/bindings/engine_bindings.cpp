@@ -6,6 +6,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <oneapi/tbb/global_control.h>
+#include "section_bindings.h"
 
 #include <memory>
 
@@ -63,6 +64,7 @@ NB_MODULE(_engine, m) {
   m.doc() = "Transom's light transport engine.";
   nb::exception<InputError>(m, "EngineInputError", PyExc_ValueError);
   nb::exception<GlError>(m, "GlError", PyExc_RuntimeError);
+  bind_section(m);
 
   m.def(
       "gl_backend", [] { return GlContext().name(); }, "Name of the OpenGL context that volumes would use.");

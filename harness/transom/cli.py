@@ -40,6 +40,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
     "report": (judging.report, "Run and time everything; write the report."),
     "bench": (benching.bench, "Time a scene; or two builds against each other."),
     "trace": (tracing.trace, "Where the time goes, for Perfetto."),
+    "measure": (products.measure, "Trace light through a product; its tables as Klems XML."),
     "bsdf": (products.bsdf, "Check a product's BSDF file; export it as Klems XML."),
     "check": (checking.check, "Has accuracy changed? References, and our own baseline."),
     "bless": (checking.bless, "Accept the present answers as a suite's baseline."),

@@ -76,7 +76,9 @@ def _suites() -> list[str]:
 
 
 def _products() -> list[str]:
-    return _aligned(list(GLAZING))
+    from transom.products import list_products, load_product
+
+    return _aligned([*GLAZING, *((name, load_product(name).title) for name in list_products())])
 
 
 def _aligned(rows: list[tuple[str, str]]) -> list[str]:

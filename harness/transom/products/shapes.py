@@ -1,0 +1,267 @@
+"""Builders of sections, one a kind of product. Lengths in metres, angles in degrees; outdoors is z <= 0, y is up.
+
+Left and right of a line from a to b are seen with y to the right and z up: along +y the left side looks to the room.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from transom.products.section import Line, Point, Section, polyline
+
+AIR = (1.0, 0.0)
+SHEET_M = 1e-6
+"""Distance between the two sides of a sheet whose sides differ, and from cuts to the faces that they nearly reach."""
+
+OFFSET = 0.37
+"""Of a period: where a section begins, so that no line lies on the border of the period."""
+
+ARC_LINES = 24
+"""Straight lines that stand for an arc."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A builder and what it is."""
+
+    words: str
+    build: Callable[..., Section]
+
+    def parameters(self) -> list[str]:
+        return list(inspect.signature(self.build).parameters)
+
+
+def slab(thickness: float, index: float = 1.52, absorption: float = 0.0) -> Section:
+    """One flat pane: the identity among products."""
+    _require(thickness > 0, "thickness must be > 0")
+    return Section(thickness, (AIR, (index, absorption)), tuple(_pane(0.0, thickness, thickness, 1)))
+
+
+def prismatic(
+    pitch: float,
+    angle_low: float,
+    angle_high: float,
+    base: float,
+    index: float = 1.49,
+    absorption: float = 0.0,
+    prisms_outdoors: float = 0.0,
+) -> Section:
+    """Prisms on a flat sheet. angle_low, angle_high: between the sheet and the facet that rises with y, and that falls
+    with y; 90 at most for one of them. prisms_outdoors: 1 turns the prisms towards the sun, 0 towards the room."""
+    _require(pitch > 0 and base > 0, "pitch and base must be > 0")
+    _require(0 < angle_low <= 90 and 0 < angle_high <= 90, "facet angles are within 0..90 degrees")
+    _require(angle_low < 90 or angle_high < 90, "only one facet can be upright")
+    low, high = 1 / math.tan(math.radians(angle_low)), 1 / math.tan(math.radians(angle_high))
+    height = pitch / (low + high)
+    profile: list[Point] = [(0.0, base), (height * low, base + height), (pitch, base)]
+    lines = [
+        Line((0.0, 0.0), (pitch, 0.0), left=1, right=0),
+        *(line for line in polyline(profile, left=0, right=1) if line.a != line.b),
+    ]
+    section = Section(pitch, (AIR, (index, absorption)), tuple(_moved(lines, pitch)))
+    return _turned(section) if prisms_outdoors else section
+
+
+def laser_cut_panel(
+    spacing: float, depth: float, index: float = 1.49, absorption: float = 0.0, kerf: float = 0.0
+) -> Section:
+    """Horizontal cuts through a sheet [Edmonds 1993]. kerf: width of a cut; 0 is a gap without width."""
+    _require(spacing > kerf >= 0 and depth > 0, "0 <= kerf < spacing and depth > 0")
+    if kerf == 0:
+        lines = [*_pane(0.0, depth, spacing, 1), Line((0.0, SHEET_M), (0.0, depth - SHEET_M), "gap", 1, 1)]
+    else:
+        wide = spacing - kerf
+        lines = [
+            Line((0.0, 0.0), (wide, 0.0), left=1, right=0),
+            Line((0.0, depth), (wide, depth), left=0, right=1),
+            Line((0.0, 0.0), (0.0, depth), left=0, right=1),
+            Line((wide, 0.0), (wide, depth), left=1, right=0),
+        ]
+    return Section(spacing, (AIR, (index, absorption)), tuple(_moved(lines, spacing)))
+
+
+def slat_blind(
+    spacing: float,
+    width: float,
+    tilt: float,
+    sagitta: float = 0.0,
+    mirror_top: float = 0.0,
+    diffuse_top: float = 0.0,
+    mirror_bottom: float = 0.0,
+    diffuse_bottom: float = 0.0,
+    openness: float = 0.0,
+) -> Section:
+    """A venetian blind. tilt: 0 is horizontal (open), positive lowers the outer edge. sagitta: how far a slat curves up
+    in its middle. Each side is a mirror or diffuse, by which reflectance is not 0. openness: share of holes."""
+    _require(spacing > 0 and width > 0, "spacing and width must be > 0")
+    for mirror, diffuse in ((mirror_top, diffuse_top), (mirror_bottom, diffuse_bottom)):
+        _require(mirror == 0 or diffuse == 0, "a side is a mirror or diffuse, not both")
+    along = np.linspace(-0.5, 0.5, 2 if sagitta == 0 else ARC_LINES + 1)
+    t = math.radians(tilt)
+    points: list[Point] = []
+    for u in along:
+        bow = 4 * sagitta * (0.25 - u * u)
+        points.append(
+            (width * u * math.sin(t) + bow * math.cos(t), width * (u + 0.5) * math.cos(t) - bow * math.sin(t))
+        )
+    # a -> b runs into the room: its left is below (-y), its right above.
+    lowered = [(y - SHEET_M, z) for y, z in points]
+    lines = [
+        *polyline(points, **_side("right", mirror_top, diffuse_top, openness)),
+        *polyline(lowered, **_side("left", mirror_bottom, diffuse_bottom, openness)),
+    ]
+    if openness > 0:
+        # Holes go through both sheets at once: one sheet carries them, and what the two sides reflect.
+        _require(
+            (mirror_top == 0) == (mirror_bottom == 0), "a perforated slat has two diffuse sides or two mirrored sides"
+        )
+        kind = "mirror" if mirror_top or mirror_bottom else "diffuse"
+        lines = polyline(
+            points,
+            kind=kind,
+            reflectance=mirror_bottom or diffuse_bottom,
+            reflectance_right=mirror_top or diffuse_top,
+            openness=openness,
+        )
+    return Section(spacing, (AIR,), tuple(_moved(lines, spacing)))
+
+
+def curved_lamellae(
+    spacing: float,
+    thickness: float,
+    depth: float,
+    slope_out: float,
+    slope_in: float,
+    index: float = 1.49,
+    absorption: float = 0.0,
+    pane: float = 0.004,
+    gap: float = 0.003,
+) -> Section:
+    """Curved bars stacked between two panes of glass, which guide light by total reflection. slope_out, slope_in: of
+    the bars at the outdoor and the room end, degrees from horizontal, positive rising into the room."""
+    _require(spacing > thickness > 0 and depth > 0, "0 < thickness < spacing and depth > 0")
+    z = np.linspace(0.0, depth, ARC_LINES + 1)
+    a, b = math.tan(math.radians(slope_out)), math.tan(math.radians(slope_in))
+    middle = a * z + (b - a) * z * z / (2 * depth)
+    start = pane + gap
+    low = [(float(y), float(start + w)) for y, w in zip(middle, z, strict=True)]
+    high = [(y + thickness, w) for y, w in low]
+    lines = [
+        *polyline(low, left=0, right=1),
+        *polyline(high, left=1, right=0),
+        Line(low[0], high[0], left=1, right=0),
+        Line(low[-1], high[-1], left=0, right=1),
+        *_pane(0.0, pane, spacing, 2),
+        *_pane(start + depth + gap, start + depth + gap + pane, spacing, 2),
+    ]
+    return Section(spacing, (AIR, (index, absorption), (1.52, 0.0)), tuple(_moved(lines, spacing)))
+
+
+def voids(
+    spacing: float, void_depth: float, void_height: float, cover: float, index: float = 1.49, absorption: float = 0.0
+) -> Section:
+    """A sheet with slender voids inside: level above, sloping below, blunt towards the room. cover: sheet before and
+    behind the voids."""
+    _require(
+        spacing > void_height > 0 and void_depth > 0 and cover > 0, "0 < void_height < spacing, depth and cover > 0"
+    )
+    thickness = void_depth + 2 * cover
+    tip, top, bottom = (0.0, cover), (0.0, cover + void_depth), (-void_height, cover + void_depth)
+    lines = [
+        *_pane(0.0, thickness, spacing, 1),
+        Line(tip, top, left=0, right=1),  # level: sheet above it
+        Line(tip, bottom, left=1, right=0),
+        Line(bottom, top, left=1, right=0),
+    ]
+    return Section(spacing, (AIR, (index, absorption)), tuple(_moved(lines, spacing)))
+
+
+def reflective_louvre(
+    spacing: float, width: float, rise: float, bow: float, reflectance: float, reflectance_below: float
+) -> Section:
+    """Fixed mirrored slats whose upper side is hollow: they send high sun to the ceiling.
+
+    rise: of the room edge over the outer edge. bow: how far the middle hangs below the line between the edges.
+    """
+    _require(spacing > 0 and width > 0 and bow >= 0, "spacing and width must be > 0, bow not negative")
+    u = np.linspace(0.0, 1.0, ARC_LINES + 1)
+    points = [(float(rise * t - 4 * bow * t * (1 - t)), float(width * t)) for t in u]
+    below = [(y - SHEET_M, z) for y, z in points]
+    lines = [
+        *polyline(points, **_side("right", reflectance, 0.0, 0.0)),
+        *polyline(below, **_side("left", reflectance_below, 0.0, 0.0)),
+    ]
+    return Section(spacing, (AIR,), tuple(_moved(lines, spacing)))
+
+
+SHAPES: dict[str, Shape] = {
+    "slab": Shape("a flat pane", slab),
+    "prismatic": Shape("prisms on a sheet", prismatic),
+    "laser_cut_panel": Shape("a sheet with level cuts", laser_cut_panel),
+    "slat_blind": Shape("a venetian blind, plain, mirrored or perforated", slat_blind),
+    "curved_lamellae": Shape("curved bars between panes", curved_lamellae),
+    "voids": Shape("a sheet with slender voids", voids),
+    "reflective_louvre": Shape("fixed hollow mirrors", reflective_louvre),
+}
+
+
+def _require(is_true: bool, words: str) -> None:
+    if not is_true:
+        raise ValueError(words)
+
+
+def _pane(low: float, high: float, period: float, medium: int) -> list[Line]:
+    return [
+        Line((0.0, low), (period, low), left=medium, right=0),
+        Line((0.0, high), (period, high), left=0, right=medium),
+    ]
+
+
+def _side(side: str, mirror: float, diffuse: float, openness: float) -> dict[str, object]:
+    """Arguments of the lines of one side of a sheet; the other side, which nothing meets, is black."""
+    name = "reflectance" if side == "left" else "reflectance_right"
+    return {"kind": "mirror" if mirror else "diffuse", name: mirror or diffuse, "openness": openness}
+
+
+def _moved(lines: Sequence[Line], period: float) -> list[Line]:
+    """Lines moved along y, so that none lies on the border of the period."""
+    shift = OFFSET * period
+    return [
+        Line(
+            (line.a[0] + shift, line.a[1]),
+            (line.b[0] + shift, line.b[1]),
+            line.kind,
+            line.left,
+            line.right,
+            line.reflectance,
+            line.reflectance_right,
+            line.transmittance,
+            line.openness,
+        )
+        for line in lines
+    ]
+
+
+def _turned(section: Section) -> Section:
+    """The same product with its faces exchanged: z mirrored, so that left and right of each line change places."""
+    depth = section.depth[1]
+    lines = tuple(
+        Line(
+            (line.a[0], depth - line.a[1]),
+            (line.b[0], depth - line.b[1]),
+            line.kind,
+            line.right,
+            line.left,
+            line.reflectance_right,
+            line.reflectance,
+            line.transmittance,
+            line.openness,
+        )
+        for line in section.lines
+    )
+    return Section(section.period_m, section.media, lines, section.notes)
