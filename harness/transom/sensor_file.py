@@ -37,10 +37,6 @@ class SensorTable:
         """The same sensors with values [lx]."""
         return SensorTable(self.sets, self.points, self.normals, illuminance, standard_error)
 
-    def rows_of(self, name: str) -> NDArray[np.bool_]:
-        """(N,) True where a sensor belongs to the set of that name."""
-        return np.array([entry == name for entry in self.sets], bool)
-
 
 def scene_sensors(scene: Scene) -> SensorTable | None:
     """All sensor sets of a scene as one table, or None for a scene without sensors."""

@@ -1,1 +1,1 @@
-"""Independent answers to compare the engine with: Mitsuba 3, closed forms and accurate radiosity."""
+"""Independent answers to compare the engine with: Mitsuba 3, Radiance, closed forms and accurate radiosity."""

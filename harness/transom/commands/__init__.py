@@ -1,1 +1,1 @@
-"""The subcommands of `transom`, one module each for pictures, sensors, suites, verdicts and lists."""
+"""The subcommands of `transom`, by group: pictures, sensors, suites, verdicts, checks, speed, products."""

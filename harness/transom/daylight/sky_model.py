@@ -44,10 +44,6 @@ class SkyModel:
             result[up] = self.scale * self.pattern.relative_luminance(seen[:, 2], cos_sun_angle)
         return result
 
-    def zenith_luminance(self) -> float:
-        """Luminance of the zenith [cd/m²]."""
-        return self.scale * relative_zenith_luminance(self.pattern, math.asin(self.sun_direction[2]))
-
     def horizontal_illuminance(self) -> float:
         """Illuminance of the unobstructed horizontal plane by the sky alone [lx]."""
         return self.scale * relative_horizontal_illuminance(self.pattern, math.asin(self.sun_direction[2]))
