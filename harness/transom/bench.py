@@ -22,14 +22,14 @@ from pydantic import TypeAdapter, ValidationError
 from transom.bench_scenes import opening_face_count, with_other_glass, with_panes
 from transom.bench_worker import SENSOR_RAYS, phase_seconds
 from transom.daylight.condition import resolve_condition
-from transom.errors import InputError
+from transom.errors import InputError, invalid_field
 from transom.files import write_atomic
 from transom.machine_limits import BENCHMARKS, Limit, Utilisation, embree_rays, memory_copy, utilisations
 from transom.progress import CaseProgress
 from transom.provenance import Provenance, current_provenance
 from transom.scene import load_scene
 from transom.scene.model import Scene
-from transom.suite import invalid_field, resized
+from transom.suite import resized
 from transom.timing import peak_memory_mib
 
 SCHEMA_FILE = Path(__file__).resolve().parents[2] / "reports" / "bench.schema.json"

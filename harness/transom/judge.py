@@ -27,8 +27,7 @@ from typing import Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from scipy import stats
 
-from transom.errors import InputError
-from transom.suite import invalid_field
+from transom.errors import InputError, invalid_field
 
 GOOD_ENOUGH_SHARE = 1 / 3
 """A reference can judge when k u is at most this share of the tolerance."""

@@ -31,7 +31,7 @@ from pydantic import TypeAdapter, ValidationError
 from transom.bundle import find_bundle, make_case
 from transom.compare import CaseNames, compare_region
 from transom.daylight.condition import Condition, resolve_condition
-from transom.errors import InputError
+from transom.errors import InputError, invalid_field
 from transom.files import write_atomic
 from transom.machine_limits import Limit, memory_copy
 from transom.progress import CaseProgress
@@ -41,7 +41,7 @@ from transom.renderer import RENDERERS, ImageResult, load_renderer
 from transom.scene import load_scene
 from transom.scene.model import ConditionSpec, Scene, View
 from transom.speed_ratio import SpeedUp, dominated, speed_ups
-from transom.suite import choose, invalid_field, resized
+from transom.suite import choose, resized
 from transom.visible import INTERIOR, region_masks
 
 SCHEMA_FILE = Path(__file__).resolve().parents[2] / "reports" / "speed_error.schema.json"

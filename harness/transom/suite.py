@@ -12,7 +12,7 @@ from typing import Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from transom.daylight.condition import Condition, resolve_condition
-from transom.errors import InputError
+from transom.errors import InputError, invalid_field
 from transom.scene import load_scene, scene_root
 from transom.scene.model import ConditionSpec, Scene, View
 
@@ -156,14 +156,6 @@ def choose(entries: Sequence[Named], names: Sequence[str] | None, scene: Scene, 
 def resized(view: View, width: int, height: int | None = None) -> View:
     """The view at another size; without `height` it keeps its proportions."""
     return dataclasses.replace(view, width=width, height=height or max(1, round(width * view.height / view.width)))
-
-
-def invalid_field(error: ValidationError, path: Path) -> InputError:
-    """The first problem of a malformed file as one line: its place, the value found, what is allowed."""
-    first = error.errors()[0]
-    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]).lstrip(".")
-    value = None if first["type"] == "missing" else first["input"]
-    return InputError(f"is refused: {first['msg']}", file=path, field=place or "file", value=value)
 
 
 def _cases(line: CaseEntry, width: int | None, method: str) -> list[SuiteCase]:

@@ -1,0 +1,77 @@
+"""The same scene with other glazing in an opening: how products are compared."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Sequence
+
+from transom.errors import InputError
+from transom.fenestration.choice import choose_product
+from transom.glass import MAX_TRANSMITTANCE
+from transom.scene.model import Opening, Scene
+
+CLEAR = re.compile(r"clear(?::(?P<transmittance>[0-9.]+))?")
+PRODUCT = re.compile(r"(?P<name>[^()]+?)\s*(?:\((?P<parameters>[^()]*)\))?")
+
+
+def reglazed(scene: Scene, glazings: Sequence[str]) -> Scene:
+    """The scene with each "OPENING=GLAZING" in place of what the opening had.
+
+    GLAZING: "none", "clear" or "clear:0.82" (visible transmittance; without it the best pane there is), a product such
+    as "prismatic_panel" or "prismatic_panel(angle_low=30, angle_high=60)", or the path of a BSDF file.
+    Raises InputError for an unknown opening, product or parameter.
+    """
+    openings = list(scene.openings)
+    for text in glazings:
+        name, equals, glazing = (part.strip() for part in text.partition("="))
+        known = [opening.name for opening in scene.openings]
+        if not equals or not glazing or name not in known:
+            raise InputError(
+                "is not OPENING=GLAZING with an opening of the scene",
+                file=scene.file,
+                field="glazing",
+                value=text,
+                remedy=f"Openings of the scene: {', '.join(known) or 'none'}. Write such as NAME=prismatic_panel",
+            )
+        index = known.index(name)
+        openings[index] = _glazed(openings[index], glazing)
+    return dataclasses.replace(scene, openings=tuple(openings))
+
+
+def _glazed(opening: Opening, glazing: str) -> Opening:
+    if glazing == "none":
+        return dataclasses.replace(opening, glazing="none", visible_transmittance=1.0, product=None)
+    clear = CLEAR.fullmatch(glazing)
+    if clear:
+        share = float(clear["transmittance"] or MAX_TRANSMITTANCE)
+        if not 0 <= share <= MAX_TRANSMITTANCE:
+            problem = f"has a transmittance outside 0..{MAX_TRANSMITTANCE:.4f}"
+            raise InputError(problem, field=f"glazing of {opening.name}", value=glazing)
+        return dataclasses.replace(opening, glazing="clear", visible_transmittance=share, product=None)
+    found = PRODUCT.fullmatch(glazing)
+    if not found:
+        raise InputError(
+            "is not a glazing",
+            field=f"glazing of {opening.name}",
+            value=glazing,
+            remedy="Write none, clear:0.82, a product such as prismatic_panel(angle_low=30), or a BSDF file",
+        )
+    product = choose_product(found["name"], _parameters(found["parameters"] or "", glazing))
+    return dataclasses.replace(opening, glazing="product", visible_transmittance=0.0, product=product)
+
+
+def _parameters(text: str, glazing: str) -> dict[str, float]:
+    parameters = {}
+    for part in filter(None, (part.strip() for part in text.split(","))):
+        name, equals, value = (word.strip() for word in part.partition("="))
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not equals or not math.isfinite(number):
+            remedy = "Such as prismatic_panel(angle_low=30)"
+            raise InputError(f"has {part!r}, which is not NAME=NUMBER", field="glazing", value=glazing, remedy=remedy)
+        parameters[name] = number
+    return parameters
