@@ -5,6 +5,7 @@
 #include <nanobind/stl/tuple.h>
 
 #include "transom/section.h"
+#include "transom/section_sweep.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -12,7 +13,7 @@ using namespace transom;
 
 namespace {
 
-using In = nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
+using Directions = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 
 // Exits as (N, 4): direction and flux.
 nb::ndarray<nb::numpy, double> exits_array(const std::vector<Exit>& exits) {
@@ -20,6 +21,14 @@ nb::ndarray<nb::numpy, double> exits_array(const std::vector<Exit>& exits) {
   for (const Exit& e : exits) kept->insert(kept->end(), {e.direction.x, e.direction.y, e.direction.z, e.flux});
   nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
   return nb::ndarray<nb::numpy, double>(kept->data(), {exits.size(), 4}, owner);
+}
+
+// A vector as an array that owns it.
+template <typename T>
+nb::ndarray<nb::numpy, T> owned_array(std::vector<T>&& values) {
+  auto* kept = new std::vector<T>(std::move(values));
+  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+  return nb::ndarray<nb::numpy, T>(kept->data(), {kept->size()}, owner);
 }
 
 }  // namespace
@@ -82,4 +91,23 @@ void bind_section(nb::module_& m) {
       },
       "section"_a, "direction"_a, "ray_count"_a, "seed"_a,
       "Exits (N, 4) transmitted and reflected as direction and flux, then the shares absorbed and unfinished.");
+
+  m.def(
+      "trace_section_sweep",
+      [](const Section& section, const Directions& directions, int ray_count, std::uint32_t seed) {
+        std::vector<glm::dvec3> incident(directions.shape(0));
+        for (std::size_t i = 0; i < incident.size(); ++i)
+          incident[i] = {directions(i, 0), directions(i, 1), directions(i, 2)};
+        SectionSweep sweep;
+        {
+          const nb::gil_scoped_release release;
+          sweep = trace_section_sweep(section, incident, ray_count, seed);
+        }
+        return nb::make_tuple(exits_array(sweep.transmitted), owned_array(std::move(sweep.incidence)),
+                              owned_array(std::move(sweep.transmitted_shares)),
+                              owned_array(std::move(sweep.reflected_shares)));
+      },
+      "section"_a, "directions"_a, "ray_count"_a, "seed"_a,
+      "Of directions (N, 3): exits (M, 4) transmitted as direction and flux, the direction (M,) that each belongs to, "
+      "and the shares (N,) transmitted and reflected.");
 }

@@ -61,6 +61,17 @@ class Traced:
 
 
 @dataclass(frozen=True)
+class Sweep:
+    """Light of N incident directions. incidence (M,): of each exit, the row of its incident direction.
+    transmittance, reflectance: (N,), direct-hemispherical."""
+
+    transmitted: Exits
+    incidence: NDArray[np.int64]
+    transmittance: Float64
+    reflectance: Float64
+
+
+@dataclass(frozen=True)
 class Section:
     """One period of a product. media: (index of refraction, absorption [1/m]), the first is air."""
 
@@ -103,6 +114,13 @@ class Section:
         x, y, z = (float(v) for v in direction)
         sent, back, absorbed, unfinished = _engine.trace_section(self._core, (x, y, z), rays, seed)
         return Traced(Exits(sent[:, :3], sent[:, 3]), Exits(back[:, :3], back[:, 3]), absorbed, unfinished)
+
+    def sweep(self, directions: Float64, rays: int = 16, seed: int = 1) -> Sweep:
+        """Sends light along each of `directions` (N, 3) through the product: many directions, few rays each."""
+        exits, incidence, sent, back = _engine.trace_section_sweep(
+            self._core, np.ascontiguousarray(directions, np.float64), rays, seed
+        )
+        return Sweep(Exits(exits[:, :3], exits[:, 3]), incidence.astype(np.int64), sent, back)
 
 
 def polyline(points: Sequence[Point], **side: object) -> list[Line]:
