@@ -25,11 +25,20 @@ nb::ndarray<nb::numpy, double> exits_array(const std::vector<Exit>& exits) {
 }  // namespace
 
 void bind_section(nb::module_& m) {
-  nb::enum_<LineKind>(m, "LineKind")
-      .value("INTERFACE", LineKind::kInterface)
-      .value("GAP", LineKind::kGap)
-      .value("MIRROR", LineKind::kMirror)
-      .value("DIFFUSE", LineKind::kDiffuse);
+  nb::enum_<SurfaceKind>(m, "SurfaceKind")
+      .value("INTERFACE", SurfaceKind::kInterface)
+      .value("GAP", SurfaceKind::kGap)
+      .value("MIRROR", SurfaceKind::kMirror)
+      .value("DIFFUSE", SurfaceKind::kDiffuse);
+
+  nb::class_<Surface>(m, "Surface")
+      .def(
+          "__init__",
+          [](Surface* self, SurfaceKind kind, int front, int back, double reflectance, double reflectance_back,
+             double transmittance, double openness) {
+            new (self) Surface{kind, front, back, reflectance, reflectance_back, transmittance, openness};
+          },
+          "kind"_a, "front"_a, "back"_a, "reflectance"_a, "reflectance_back"_a, "transmittance"_a, "openness"_a);
 
   nb::class_<Section>(m, "Section")
       .def(
@@ -49,29 +58,20 @@ void bind_section(nb::module_& m) {
           "index"_a, "absorption"_a)
       .def(
           "add_line",
-          [](Section& s, std::tuple<double, double> a, std::tuple<double, double> b, LineKind kind, int left, int right,
-             double reflectance, double reflectance_right, double transmittance, double openness) {
-            s.lines.push_back({{std::get<0>(a), std::get<1>(a)},
-                               {std::get<0>(b), std::get<1>(b)},
-                               kind,
-                               left,
-                               right,
-                               reflectance,
-                               reflectance_right,
-                               transmittance,
-                               openness});
+          [](Section& s, std::tuple<double, double> a, std::tuple<double, double> b, double bow,
+             const Surface& surface) {
+            s.lines.push_back({{std::get<0>(a), std::get<1>(a)}, {std::get<0>(b), std::get<1>(b)}, surface, bow});
           },
-          "a"_a, "b"_a, "kind"_a, "left"_a, "right"_a, "reflectance"_a, "reflectance_right"_a, "transmittance"_a,
-          "openness"_a)
+          "a"_a, "b"_a, "bow"_a, "surface"_a)
       .def("validate", &Section::validate);
 
   m.def(
       "trace_section",
       [](const Section& section, std::tuple<double, double, double> direction, int ray_count, std::uint32_t seed) {
-        SectionLight light;
+        ProductLight light;
         {
           const nb::gil_scoped_release release;
-          SectionOptions options;
+          TraceOptions options;
           options.ray_count = ray_count;
           options.seed = seed;
           const auto [x, y, z] = direction;
