@@ -96,7 +96,7 @@ void Engine::relight(Condition condition) {
     for (std::size_t p = 0; p < n; ++p) radiosity[p] = glm::vec4(lighting_.patch_smooth_radiosity[p], 0);
     parallel_indices(node_count, 64, [&](std::size_t i) {
       lighting_.node_sky[i] = sky_light(node_sky_, i);
-      lighting_.node_indirect[i] += glm::vec3(node_patches_.dot(i, radiosity));
+      lighting_.node_indirect[i] += glm::vec3(node_rows_->patches.dot(i, radiosity) + node_through_.dot(i, radiosity));
     });
   }
 }
