@@ -29,6 +29,7 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
 
 Engine::Engine(const Engine& solved, SceneGeometry scene)
     : scene_(std::move(scene)), sky_bins_(solved.sky_bins_), options_(solved.options_) {
+  options_.maximum_edge_m = solved.facts_.maximum_edge_m;
   solve(&solved);
 }
 
@@ -42,10 +43,11 @@ void Engine::solve(const Engine* solved) {
     const std::vector<char> is_indoors =
         survey_interior(scene_, *rays_, faces_, hash_seed(options_.seed, kSurveyStream));
     check_overlaps(faces_, is_indoors, *rays_);
-    const std::vector<float> edges =
-        choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
-    facts_.maximum_edge_m = *std::min_element(edges.begin(), edges.end());
-    mesh_ = std::make_unique<LightMesh>(faces_, edges, options_.elements_per_edge);
+    edges_ = solved && are_same_places(faces_, solved->faces_)
+                 ? solved->edges_
+                 : choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
+    facts_.maximum_edge_m = *std::min_element(edges_.begin(), edges_.end());
+    mesh_ = std::make_unique<LightMesh>(faces_, edges_, options_.elements_per_edge);
     gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_);
     const float element_edge = facts_.maximum_edge_m / static_cast<float>(options_.elements_per_edge);
     direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources, scene_.materials,
@@ -77,7 +79,9 @@ void Engine::solve(const Engine* solved) {
     const TracePhase phase(trace_, "links");
     light_always();
     links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes());
-    links_->prepare(beam_slots());
+    const std::vector<int> slots = beam_slots();
+    if (facts_.kept_node_rows > 0) links_->take_over(*known.engine->links_, slots, known.has_openings);
+    links_->prepare(slots);
     facts_.link_bytes = links_->byte_count();
   }
   facts_.face_count = static_cast<int>(faces_.faces.size());
@@ -140,6 +144,7 @@ void Engine::assemble_transfer(const Known& known) {
     patch_emitted_[p] = kPi * scene_.materials[faces_.faces[slot.face].material].luminance;
     row_sums[p] = is_interior_[p] ? 1.f : 1.f - row.around->escaped;
     through_.append(patches_at(row.beyond->through));
+    facts_.kept_patch_rows += known.has_surroundings && known.engine->patch_of_slot_[slot_of_patch_[p]] >= 0;
     patch_sky_.append(row.beyond->sky);
   }
   double emitting = 0, interior = 0;
