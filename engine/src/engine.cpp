@@ -1,9 +1,11 @@
 #include "transom/engine.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <unordered_map>
 
 #include "streams.h"
 #include "transom/overlap.h"
@@ -55,7 +57,7 @@ void Engine::solve(const Engine* solved) {
     beam_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, std::vector<PointSource>{}, scene_.materials,
                                                 element_edge * element_edge);
   }
-  const Known known = known_from(solved);
+  Known known = known_from(solved);
   {
     const TracePhase phase(trace_, "patches");
     patch_of_slot_.assign(static_cast<std::size_t>(mesh_->slot_count()), -1);
@@ -63,6 +65,7 @@ void Engine::solve(const Engine* solved) {
     mark_interior();
     find_unseen_patches(known);
     check_closed();
+    known.has_same_patches = known.has_surroundings && slot_of_patch_ == solved->slot_of_patch_;
   }
   {
     const TracePhase phase(trace_, "transfer");
@@ -78,18 +81,15 @@ void Engine::solve(const Engine* solved) {
     }
     const TracePhase phase(trace_, "links");
     light_always();
-    links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes());
-    const std::vector<int> slots = beam_slots();
-    if (facts_.kept_node_rows > 0) links_->take_over(*known.engine->links_, slots, known.has_openings);
-    links_->prepare(slots);
-    facts_.link_bytes = links_->byte_count();
+    link_nodes(known);
   }
   facts_.face_count = static_cast<int>(faces_.faces.size());
   facts_.patch_count = static_cast<int>(slot_of_patch_.size());
 }
 
 Engine::Known Engine::known_from(const Engine* solved) const {
-  Known known{solved};
+  Known known;
+  known.engine = solved;
   if (!solved) return known;
   known.has_surroundings = are_same_places(faces_, solved->faces_) && mesh_->has_same_cells(*solved->mesh_);
   known.has_openings = known.has_surroundings;
@@ -153,8 +153,7 @@ void Engine::assemble_transfer(const Known& known) {
     if (is_interior_[p] && patch_emitted_[p] != glm::vec3(0)) emitting += patch_area_[p];
   }
   connects_emitters_ = emitting < kConnectedShare * interior;
-  if (known.has_surroundings && slot_of_patch_ == known.engine->slot_of_patch_ &&
-      is_interior_ == known.engine->is_interior_) {
+  if (known.has_same_patches && is_interior_ == known.engine->is_interior_) {
     form_factors_ = known.engine->form_factors_;
     facts_.defects = known.engine->facts_.defects;
   } else {
@@ -190,70 +189,95 @@ std::vector<int> Engine::cell_divisions() const {
   return divisions;
 }
 
-void Engine::gather_nodes(const Known& known) {
+// Nodes in the order of slots, so that it does not depend on the way in which patches are found.
+void Engine::gather_nodes(Known& known) {
   const std::vector<int> divisions = cell_divisions();
-  std::vector<int> slots, slot_divisions;
+  std::vector<std::pair<int, int>> cells;  // slot, divisions
   for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)
-    if (patch_reflectance_[p] != glm::vec3(0)) {
-      slots.push_back(slot_of_patch_[p]);
-      slot_divisions.push_back(divisions[p]);
-    }
-  nodes_ = std::make_unique<NodeField>(*mesh_, *rays_, slots, slot_divisions);
-  const std::vector<Node>& nodes = nodes_->nodes();
-  facts_.node_count = static_cast<int>(nodes.size());
-  const bool is_known = known.has_surroundings && known.engine->nodes_ && nodes == known.engine->nodes_->nodes() &&
-                        std::all_of(slot_of_patch_.begin(), slot_of_patch_.end(),
-                                    [&](int slot) { return known.engine->patch_of_slot_[slot] >= 0; });
-  const bool has_same_patches = is_known && slot_of_patch_ == known.engine->slot_of_patch_;
-  if (is_known) {
-    node_rows_ = has_same_patches ? known.engine->node_rows_ : renumbered(*known.engine);
-    facts_.kept_node_rows = facts_.node_count;
-  } else {
-    std::vector<GatherRow> rows(nodes.size());
-    parallel_indices(nodes.size(), kGrain, [&](std::size_t i) {
-      rows[i] = gatherer_->surroundings_of_point(nodes[i], options_.node_samples, node_seed(i));
-      rows[i].reached = to_patches(rows[i].reached);
-    });
-    auto found = std::make_shared<NodeRows>();
-    for (const GatherRow& row : rows) {
-      found->exposure.push_back(row.exposure);
-      found->patches.append(row.reached);
-      found->sky.append(row.sky);
-    }
-    node_rows_ = std::move(found);
+    if (patch_reflectance_[p] != glm::vec3(0)) cells.push_back({slot_of_patch_[p], divisions[p]});
+  std::sort(cells.begin(), cells.end());
+  std::vector<int> slots, slot_divisions;
+  for (const auto& [slot, division] : cells) {
+    slots.push_back(slot);
+    slot_divisions.push_back(division);
   }
-  if (has_same_patches && known.has_openings) {
+  nodes_ = std::make_unique<NodeField>(*mesh_, *rays_, slots, slot_divisions);
+  facts_.node_count = static_cast<int>(nodes_->nodes().size());
+  find_known_nodes(known);
+  facts_.kept_node_rows =
+      static_cast<int>(std::count_if(known.node.begin(), known.node.end(), [](int node) { return node >= 0; }));
+  const bool is_the_same = known.has_same_nodes && known.has_same_patches;
+  node_rows_ = is_the_same ? known.engine->node_rows_ : node_rows(known);
+  if (is_the_same && known.has_openings) {
     node_sky_ = known.engine->node_sky_;
     node_through_ = known.engine->node_through_;
   } else {
-    look_out_of_nodes();
+    look_out_of_nodes(known);
   }
   std::vector<char> is_exposed;
   for (const float exposure : node_rows_->exposure) is_exposed.push_back(exposure >= kExposedNode);
   nodes_->finish(std::move(is_exposed));
 }
 
-// Rows of the same nodes by the present numbers of patches, all of which the other engine had, too.
-std::shared_ptr<const Engine::NodeRows> Engine::renumbered(const Engine& other) const {
-  auto rows = std::make_shared<NodeRows>(*other.node_rows_);
-  rows->patches = {};
-  for (std::size_t i = 0; i < rows->exposure.size(); ++i) {
-    std::vector<Share> row = other.node_rows_->patches.row(i);
-    for (Share& share : row) share.index = other.slot_of_patch_[share.index];
-    rows->patches.append(patches_at(row));
+// Which nodes the other engine had, if it had all patches of this one: else it left out what they are seen by.
+void Engine::find_known_nodes(Known& known) const {
+  const std::vector<Node>& nodes = nodes_->nodes();
+  known.node.assign(nodes.size(), -1);
+  if (!known.has_surroundings || !known.engine->nodes_ ||
+      !std::all_of(slot_of_patch_.begin(), slot_of_patch_.end(),
+                   [&](int slot) { return known.engine->patch_of_slot_[slot] >= 0; }))
+    return;
+  const std::vector<Node>& others = known.engine->nodes_->nodes();
+  std::unordered_multimap<std::uint32_t, int> number;
+  for (std::size_t i = 0; i < others.size(); ++i) number.emplace(node_seed(others[i]), static_cast<int>(i));
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const auto [first, last] = number.equal_range(node_seed(nodes[i]));
+    for (auto entry = first; entry != last; ++entry)
+      if (others[entry->second] == nodes[i]) known.node[i] = entry->second;
   }
-  return rows;
+  known.has_same_nodes = nodes == others;
+}
+
+std::shared_ptr<const Engine::NodeRows> Engine::node_rows(const Known& known) const {
+  const std::vector<Node>& nodes = nodes_->nodes();
+  std::vector<GatherRow> rows(nodes.size());
+  parallel_indices(nodes.size(), kGrain, [&](std::size_t i) {
+    if (known.node[i] >= 0) {
+      const auto other = static_cast<std::size_t>(known.node[i]);
+      const NodeRows& known_rows = *known.engine->node_rows_;
+      rows[i].reached = known_rows.patches.row(other);
+      for (Share& share : rows[i].reached) share.index = known.engine->slot_of_patch_[share.index];
+      rows[i].reached = patches_at(rows[i].reached);
+      rows[i].sky = known_rows.sky.row(other);
+      rows[i].exposure = known_rows.exposure[other];
+    } else {
+      rows[i] = gatherer_->surroundings_of_point(nodes[i], options_.node_samples, node_seed(nodes[i]));
+      rows[i].reached = to_patches(rows[i].reached);
+    }
+  });
+  auto found = std::make_shared<NodeRows>();
+  for (const GatherRow& row : rows) {
+    found->exposure.push_back(row.exposure);
+    found->patches.append(row.reached);
+    found->sky.append(row.sky);
+  }
+  return found;
 }
 
 // What nodes see through openings.
-void Engine::look_out_of_nodes() {
+void Engine::look_out_of_nodes(const Known& known) {
   const std::vector<Node>& nodes = nodes_->nodes();
   std::vector<GatherRow> rows(nodes.size());
   parallel_indices(nodes.size(), kGrain, [&](std::size_t i) {
     GatherRow& row = rows[i];
+    if (known.node[i] >= 0 && known.has_openings && known.has_same_patches) {
+      row.sky = known.engine->node_sky_.row(static_cast<std::size_t>(known.node[i]));
+      row.through = known.engine->node_through_.row(static_cast<std::size_t>(known.node[i]));
+      return;
+    }
     row.exposure = node_rows_->exposure[i];
     row.sky = node_rows_->sky.row(i);
-    gatherer_->look_through_openings(nodes[i], options_.node_samples, node_seed(i), row);
+    gatherer_->look_through_openings(nodes[i], options_.node_samples, node_seed(nodes[i]), row);
     row.through = to_patches(row.through);
   });
   for (const GatherRow& row : rows) {
@@ -262,8 +286,21 @@ void Engine::look_out_of_nodes() {
   }
 }
 
-std::uint32_t Engine::node_seed(std::size_t node) const {
-  return hash_seed(options_.seed, hash_seed(kNodeStream, node));
+void Engine::link_nodes(const Known& known) {
+  links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes());
+  PointLinks::Known known_links;
+  if (known.has_surroundings && known.engine->links_)
+    known_links = {known.engine->links_.get(), known.node, known.has_same_nodes, known.has_openings};
+  links_->prepare(beam_slots(), known_links);
+  facts_.link_bytes = links_->byte_count();
+}
+
+// Samples of a node depend on where it is alone, so that another object in the room does not change them.
+std::uint32_t Engine::node_seed(const Node& node) const {
+  std::uint32_t seed = hash_seed(options_.seed, kNodeStream);
+  for (const glm::vec3 v : {node.position, node.normal})
+    for (int axis = 0; axis < 3; ++axis) seed = hash_seed(seed, std::bit_cast<std::uint32_t>(v[axis]));
+  return seed;
 }
 
 // Patches that a beam may light: they see some of the sky.

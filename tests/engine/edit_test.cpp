@@ -52,7 +52,9 @@ SolveFacts expect_fresh(const Edit& edit) {
   SceneGeometry scene = furnished_room();
   const Engine before(scene, tregenza(), options());
   edit(scene);
-  const Engine edited(before, scene), fresh(scene, tregenza(), options());
+  SolveOptions same_edge = options();
+  same_edge.maximum_edge_m = before.facts().maximum_edge_m;
+  const Engine edited(before, scene), fresh(scene, tregenza(), same_edge);
   expect_equal_light(edited, fresh);
   return edited.facts();
 }

@@ -127,6 +127,9 @@ class Engine {
     const Engine* engine = nullptr;
     bool has_surroundings = false;  // faces and their cells are the same
     bool has_openings = false;      // and so is all glazing
+    bool has_same_patches = false;  // with the same numbers
+    bool has_same_nodes = false;    // with the same numbers
+    std::vector<int> node;          // its number of each node here, or -1
   };
   /// What a patch sees, by slot: without looking through openings; and through them, with all of the sky.
   struct PatchRow {
@@ -149,10 +152,12 @@ class Engine {
   void check_closed();
   void assemble_transfer(const Known& known);
   std::vector<int> cell_divisions() const;
-  void gather_nodes(const Known& known);
-  void look_out_of_nodes();
-  std::shared_ptr<const NodeRows> renumbered(const Engine& other) const;
-  std::uint32_t node_seed(std::size_t node) const;
+  void gather_nodes(Known& known);
+  void find_known_nodes(Known& known) const;
+  std::shared_ptr<const NodeRows> node_rows(const Known& known) const;
+  void look_out_of_nodes(const Known& known);
+  void link_nodes(const Known& known);
+  std::uint32_t node_seed(const Node& node) const;
   void solve_classic();
   void show_classic(Lighting& lighting) const;
   std::vector<Share> to_slots(std::vector<Share> elements) const;
