@@ -53,6 +53,7 @@ struct Session {
   const Lighting* previous() const { return present->shooting.unshot.empty() ? nullptr : present.get(); }
   Session(SceneGeometry scene, const SkyBins& bins, SolveOptions options)
       : engine(std::move(scene), bins, options), renderer(engine) {}
+  Session(const Session& solved, SceneGeometry scene) : engine(solved.engine, std::move(scene)), renderer(engine) {}
 };
 
 // At most so many threads while a `with` block lasts.
@@ -174,7 +175,9 @@ NB_MODULE(_engine, m) {
       .def_ro("leak_share", &SolveFacts::leak_share)
       .def_ro("defects", &SolveFacts::defects)
       .def_ro("cluster_count", &SolveFacts::cluster_count)
-      .def_ro("link_bytes", &SolveFacts::link_bytes);
+      .def_ro("link_bytes", &SolveFacts::link_bytes)
+      .def_ro("kept_patch_rows", &SolveFacts::kept_patch_rows)
+      .def_ro("kept_node_rows", &SolveFacts::kept_node_rows);
 
   nb::class_<Condition>(m, "Condition")
       .def(
@@ -228,6 +231,8 @@ NB_MODULE(_engine, m) {
   nb::class_<Session>(m, "Engine")
       .def(nb::init<SceneGeometry, const SkyBins&, SolveOptions>(), "scene"_a, "sky_bins"_a, "options"_a,
            nb::call_guard<nb::gil_scoped_release>(), "Solves the scene: everything that depends on geometry alone.")
+      .def(nb::init<const Session&, SceneGeometry>(), "solved"_a, "scene"_a, nb::call_guard<nb::gil_scoped_release>(),
+           "Solves an edited scene, and takes over what is still valid: equal to solving it afresh.")
       .def_prop_ro("facts", [](const Session& s) { return s.engine.facts(); })
       .def(
           "relight", [](Session& s, const Condition& c) { s.present = s.engine.relight(c, s.previous()); },
