@@ -30,6 +30,7 @@ from transom_reference.light_along import LightAlong
 from transom_reference.light_vertices import LightVertices, connection_density
 from transom_reference.low_discrepancy import lane_seed, pair
 from transom_reference.mitsuba_setup import dr, floats, mi
+from transom_reference.panels import outward_direction
 from transom_reference.path_starts import GivenRays, SensorPoints, Start, indoors
 from transom_reference.sun_patches import SunPatches, pilot_multiplicity
 from transom_reference.surface import offset, surface_at
@@ -193,12 +194,24 @@ class _Paths:
         choice, roulette = self._numbers(step, 0, sample)
         passed = light.transmittance(mi.UInt32(dr.maximum(surface.opening, 0.0)), dr.abs(surface.along), is_glass)
         room = dr.select(surface.along > 0.0, self._room(surface, is_glass), 0.0)
+        if scene.panels is not None:
+            panel = light.panel_at(found.prim_index, direction, is_glass & (surface.along > 0.0))
+            passed = dr.select(panel.active, panel.share, passed)
         through_probability = dr.select(room > 0.0, passed / (passed + room), 1.0)
         through = is_glass & (choice < through_probability)
         reflected = is_glass & ~through
         sampled = through & after_vertex
+        if scene.panels is not None:
+            sampled |= panel.active & after_vertex
         crossing = light.portal_density(found.prim_index, point, direction, last, last_normal, last_weight, sampled)
+        if scene.panels is not None:
+            # What a panel sends is sampled by points on that panel alone, whatever panes are before it.
+            portal_density = dr.select(panel.active, 0.0, portal_density)
         portal_density = portal_density + dr.select(sampled, crossing, 0.0)
+        if scene.panels is not None:
+            residual = light.panel_sun(panel, point, surface.face_normal)
+            share = ray_density / (ray_density + portal_density)
+            total = total + dr.select(panel.active, throughput * residual * share, 0.0)
         throughput = dr.select(through, throughput * passed / through_probability, throughput)
         throughput = dr.select(reflected, throughput / (1.0 - through_probability), throughput)
         ray_density = dr.select(through, ray_density * through_probability, ray_density)
@@ -226,6 +239,8 @@ class _Paths:
         arrival = ray_density * dr.abs(dr.dot(normal, direction)) / dr.maximum(dr.squared_norm(point - last), 1e-12)
         if scene.sun_direction is not None:
             total = total + self.vertex_light.sun(here, arrival, after_vertex & ~is_glass)
+        if scene.panels is not None and scene.panels.beams:
+            total = total + self.vertex_light.beams(here, arrival, after_vertex & ~is_glass)
         if self.batch.vertices is not None:
             kept = dr.select(vertex & inside & after_vertex, arrival / (arrival + self.connection_density), 1.0)
             throughput = throughput * kept
@@ -258,6 +273,13 @@ class _Paths:
         last = dr.select(vertex, point, last)
         last_normal = dr.select(vertex, shading, last_normal)
         last_weight = dr.select(vertex, weight, last_weight)
+
+        if scene.panels is not None:
+            # Beyond a panel light goes another way: nothing has been sampled along it.
+            bent = through & panel.active
+            direction = dr.select(bent, outward_direction(scene.panels, panel, next_1, next_2), direction)
+            last_normal = dr.select(bent, mi.Normal3f(0.0), last_normal)
+            last_weight = dr.select(bent, 0.0, last_weight)
 
         if scene.mirror_table is not None:
             # As from a camera: nothing has been sampled along a mirrored ray.

@@ -11,13 +11,18 @@ from transom_reference.light_along import LightAlong
 from transom_reference.light_vertices import LightVertices
 from transom_reference.low_discrepancy import pair
 from transom_reference.mitsuba_setup import dr, mi
+from transom_reference.panels import outward_direction, panel_side
 from transom_reference.resampling import resample
 from transom_reference.sun_patches import SunPatches, sun_disc_direction
+from transom_reference.surface import gather4, offset
 from transom_reference.transport_scene import TransportScene
 
 INVERSE_PI = float(1.0 / np.pi)
 SUN_DIMENSION = 1 << 16
 """Pair number of the place on the sun's disc at step 0: beyond those of all other choices."""
+
+PANEL_DIMENSION = 1 << 17
+"""Pair number, at step 0, of the direction from which light reaches a panel."""
 
 DIMENSION_PAIRS = 6
 """Pairs of numbers that one step of a path uses."""
@@ -99,7 +104,7 @@ class VertexLight:
         """Sky and ground through a sampled point of an opening, and the sum of the openings' weights."""
         choice, _ = self._numbers(here, 1)
         u, v = self._numbers(here, 2)
-        target, weight = self.light.portal_point(choice, u, v, here.point, here.shading, here.active)
+        portal, target, weight = self.light.portal_point(choice, u, v, here.point, here.shading, here.active)
         towards, _, cosine, seen = _towards(here, target)
         seen &= weight > 0.0
         passed, through_probability, portal_density = self.light.outward(
@@ -108,7 +113,58 @@ class VertexLight:
         ray_density = cosine * INVERSE_PI * through_probability
         seen = seen & (passed > 0.0) & (portal_density > 0.0)
         arriving = self.light.beyond(towards, seen) * (passed * cosine / (portal_density + ray_density))
-        return dr.select(seen, here.factor * arriving, 0.0), weight
+        found = dr.select(seen, here.factor * arriving, 0.0)
+        if self.scene.panels is not None:
+            found = found + self._panel(here, portal, target, weight)
+        return found, weight
+
+    def _panel(self, here: Vertex, portal: Any, target: Any, weight: Any) -> Any:
+        """What a panel sends here from a sampled point: the sun's residual, and sky and ground through its BTDF."""
+        scene, light = self.scene, self.light
+        assert scene.panels is not None
+        towards, squared, cosine, seen = _towards(here, target)
+        side = panel_side(scene.panels, portal, towards, seen & (weight > 0.0))
+        last_row = gather4(scene.portal_table, portal * 4 + 3, side.active)
+        normal, along = last_row.xyz, dr.dot(last_row.xyz, towards)
+        density = light.density_at(portal, target, along, here.point, here.shading, weight, side.active)
+        side.active &= density > 0.0
+        passed, probability = light.between(here.outside, towards, dr.sqrt(squared), side.active)
+        side.active &= passed > 0.0
+        ray_density = cosine * INVERSE_PI * probability
+        arriving = light.panel_sun(side, target, normal) / (density + ray_density)
+
+        dimension = mi.UInt32(PANEL_DIMENSION) + here.step
+        numbers = pair(self.seed, dimension, here.sample, self.log2_samples)
+        outward = outward_direction(scene.panels, side, *numbers)
+        clear, onward = light.unhindered(offset(target, normal), outward, side.active & (side.share > 0.0))
+        room = dr.gather(mi.Float, scene.room_reflectance, mi.UInt32(last_row.w), side.active)
+        through_probability = side.share / dr.maximum(side.share + room, 1e-12) * onward
+        sky = light.beyond(outward, side.active & (clear > 0.0)) * (clear * side.share)
+        arriving = arriving + dr.select(clear > 0.0, sky / (density + ray_density * through_probability), 0.0)
+        return dr.select(side.active, here.factor * arriving * (passed * cosine), 0.0)
+
+    def beams(self, here: Vertex, arrival: Any, may_be_connected: Any) -> Any:
+        """The panels' beams, each with the ray's share as for the sun itself."""
+        panels = self.scene.panels
+        assert panels is not None
+
+        def add(index: Any, total: Any) -> tuple[Any, Any]:
+            row = gather4(panels.beam_table, index * 2, here.active)
+            cosine, true_cosine = -dr.dot(here.shading, row.xyz), -dr.dot(here.normal, row.xyz)
+            lit = here.active & (cosine > 0.0) & (true_cosine > 0.0)
+            passed, density = self.light.beam(here.outside, index, lit)
+            share = mi.Float(1.0)
+            if self.batch.patches is not None:
+                connection = self.batch.patches.multiplicity * density * true_cosine
+                share = dr.select(may_be_connected & (density > 0.0), arrival / (arrival + connection), 1.0)
+            normal_rgb = gather4(panels.beam_table, index * 2 + 1, lit).xyz
+            found = mi.Color3f(normal_rgb) * (passed * cosine * share)
+            return index + 1, total + dr.select(lit & (passed > 0.0), found, 0.0)
+
+        count = len(panels.beams)
+        state = (mi.UInt32(0), dr.zeros(mi.Color3f, dr.width(here.active)))
+        _, total = dr.while_loop(state, lambda index, _: index < count, add, label="beams")
+        return here.factor * total
 
     def sun_patch(self, here: Vertex) -> Any:
         """A point lit by the sun through an opening, connected to the vertex."""
