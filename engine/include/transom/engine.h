@@ -47,8 +47,8 @@ struct SolveFacts {
   float maximum_edge_m = 0;
   double leak_share = 0;  ///< of the hemisphere rays of interior patches, those that met nothing
   TransferDefects defects;
-  int cluster_count = 0;       ///< of patches, for interreflection
-  std::size_t link_bytes = 0;  ///< of what is kept of how nodes see patches
+  int cluster_count = 0;                        ///< of patches, for interreflection
+  std::size_t link_bytes = 0;                   ///< of what is kept of how nodes see patches
   int kept_patch_rows = 0, kept_node_rows = 0;  ///< taken over from another engine, but for what lies behind openings
 };
 
@@ -186,11 +186,13 @@ class Engine {
   std::vector<int> patch_of_slot_;  // -1: takes no part
   std::vector<int> slot_of_patch_;
   std::vector<PatchRow> patch_rows_;
-  std::vector<float> patch_area_;  // exposed part [m²]
+  std::vector<float> patch_area_;     // exposed part [m²]
+  std::vector<float> element_share_;  // of that area: patch * elements_per_slot + element
   std::vector<glm::vec3> patch_reflectance_, patch_emitted_;
   std::vector<char> is_interior_;
-  std::vector<int> unseen_slots_;   // that see patches indoors and were seen by none
-  bool connects_emitters_ = false;  // small emitters: found by connection, not by rays
+  DirectLight::Receivers receivers_;  // all patches
+  std::vector<int> unseen_slots_;     // that see patches indoors and were seen by none
+  bool connects_emitters_ = false;    // small emitters: found by connection, not by rays
   std::shared_ptr<const SparseRows> form_factors_;
   SparseRows through_, patch_sky_;
   std::unique_ptr<Interreflection> interreflection_;
