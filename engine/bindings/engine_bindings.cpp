@@ -43,10 +43,14 @@ nb::ndarray<nb::numpy, float> picture(std::vector<glm::vec3>&& pixels, int width
   return to_array<float>(std::move(pixels), {static_cast<std::size_t>(height), static_cast<std::size_t>(width), 3});
 }
 
-// The engine with the renderer that looks at it.
+// The engine with its present light, the renderer that looks at it, and the sensors that were asked last.
 struct Session {
   Engine engine;
   FrameRenderer renderer;
+  std::shared_ptr<const Lighting> present = std::make_shared<const Lighting>();
+  std::shared_ptr<Lighting> in_steps;
+  Sensors sensors;
+  const Lighting* previous() const { return present->shooting.unshot.empty() ? nullptr : present.get(); }
   Session(SceneGeometry scene, const SkyBins& bins, SolveOptions options)
       : engine(std::move(scene), bins, options), renderer(engine) {}
 };
@@ -226,21 +230,26 @@ NB_MODULE(_engine, m) {
            nb::call_guard<nb::gil_scoped_release>(), "Solves the scene: everything that depends on geometry alone.")
       .def_prop_ro("facts", [](const Session& s) { return s.engine.facts(); })
       .def(
-          "relight", [](Session& s, const Condition& c) { s.engine.relight(c); }, "condition"_a,
-          nb::call_guard<nb::gil_scoped_release>())
+          "relight", [](Session& s, const Condition& c) { s.present = s.engine.relight(c, s.previous()); },
+          "condition"_a, nb::call_guard<nb::gil_scoped_release>())
       .def(
-          "begin_relight", [](Session& s, const Condition& c) { s.engine.begin_relight(c); }, "condition"_a,
-          nb::call_guard<nb::gil_scoped_release>(), "Classic method: direct light at once, indirect light to follow.")
+          "begin_relight",
+          [](Session& s, const Condition& c) {
+            s.in_steps = std::make_shared<Lighting>(s.engine.begin_relight(c, s.previous()));
+            s.present = s.in_steps;
+          },
+          "condition"_a, nb::call_guard<nb::gil_scoped_release>(),
+          "Classic method: direct light at once, indirect light to follow.")
       .def(
-          "continue_relight", [](Session& s, int shots) { return s.engine.continue_relight(shots); }, "shots"_a,
-          nb::call_guard<nb::gil_scoped_release>(), "Shoots at most so often; whether more is to come.")
+          "continue_relight", [](Session& s, int shots) { return s.engine.continue_relight(*s.in_steps, shots); },
+          "shots"_a, nb::call_guard<nb::gil_scoped_release>(), "Shoots at most so often; whether more is to come.")
       .def(
           "render",
           [](Session& s, const View& view, Visibility visibility, int edge_samples, bool components) {
             Frame frame;
             {
               const nb::gil_scoped_release release;
-              frame = s.renderer.render(view, {visibility, edge_samples, components});
+              frame = s.renderer.render(view, *s.present, {visibility, edge_samples, components});
             }
             nb::dict result;
             const int w = frame.width, h = frame.height;
@@ -262,7 +271,10 @@ NB_MODULE(_engine, m) {
             std::vector<Irradiance> e;
             {
               const nb::gil_scoped_release release;
-              e = s.engine.illuminance(to_vector<glm::dvec3>(points), to_vector<glm::vec3>(normals), samples);
+              const std::vector<glm::dvec3> places = to_vector<glm::dvec3>(points);
+              const std::vector<glm::vec3> up = to_vector<glm::vec3>(normals);
+              if (!s.sensors.are(places, up, samples)) s.sensors = s.engine.sensors(places, up, samples);
+              e = s.engine.illuminance(*s.present, s.sensors);
             }
             const std::size_t n = e.size();
             return to_array<float>(std::move(e), {n, 3, 3});
@@ -271,7 +283,7 @@ NB_MODULE(_engine, m) {
       .def(
           "audit",
           [](const Session& s, int rays_per_opening) {
-            const EnergyAudit a = s.engine.audit(rays_per_opening);
+            const EnergyAudit a = s.engine.audit(*s.present, rays_per_opening);
             nb::dict result;
             const auto put = [&](const char* name, glm::dvec3 v) { result[name] = nb::make_tuple(v.x, v.y, v.z); };
             put("in_sky", a.in_sky);
@@ -308,10 +320,10 @@ NB_MODULE(_engine, m) {
             return to_array<float>(std::move(areas), {n});
           },
           nb::rv_policy::move, "Exposed area of each patch [m²].")
-      .def_prop_ro("sweeps", [](const Session& s) { return s.engine.lighting().sweeps; })
-      .def_prop_ro("shots", [](const Session& s) { return s.engine.lighting().shots; })
-      .def_prop_ro("unshot_share", [](const Session& s) { return s.engine.lighting().unshot_share; })
-      .def_prop_ro("forward_rays", [](const Session& s) { return s.engine.lighting().forward_ray_count; })
+      .def_prop_ro("sweeps", [](const Session& s) { return s.present->sweeps; })
+      .def_prop_ro("shots", [](const Session& s) { return s.present->shots; })
+      .def_prop_ro("unshot_share", [](const Session& s) { return s.present->unshot_share; })
+      .def_prop_ro("forward_rays", [](const Session& s) { return s.present->forward_ray_count; })
       .def_prop_ro("trace",
                    [](Session& s) {
                      nb::list events;

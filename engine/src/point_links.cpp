@@ -75,12 +75,12 @@ glm::vec3 PointLinks::exposed_middle(int slot_index, glm::vec3 normal) const {
       ->origin;
 }
 
-void PointLinks::link(int slot_index) {
+PointLinks::Link PointLinks::link(int slot_index) const {
   const Slot slot = mesh_.slot(slot_index);
   const Face& face = mesh_.faces().faces[slot.face];
   const glm::vec3 normal = slot.side == 0 ? face.normal : -face.normal, middle = exposed_middle(slot_index, normal);
   const float size2 = 2 * mesh_.cell_area(slot.face, slot.cell), size = std::sqrt(size2);
-  Link& link = links_[slot_index];
+  Link link;
   std::vector<int> far_points;
   std::vector<float> height(kBlock), distance2(kBlock), cosine(kBlock);
   for (std::size_t begin = 0; begin < x_.size(); begin += kBlock) {
@@ -99,7 +99,7 @@ void PointLinks::link(int slot_index) {
   }
   link_far(link, middle, far_points);
   link_near(link, slot_index, normal);
-  link.is_ready = true;
+  return link;
 }
 
 void PointLinks::link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points) const {
@@ -146,20 +146,45 @@ void PointLinks::link_near(Link& link, int slot, glm::vec3 normal) const {
   link.near_weight = std::move(weights);
 }
 
-void PointLinks::prepare(const std::vector<int>& slots) {
-  std::vector<int> missing;
-  for (const int slot : slots)
-    if (!links_[slot].is_ready) missing.push_back(slot);
+void PointLinks::prepare(const std::vector<int>& slots) const {
   constexpr std::size_t kBatch = 256;  // of patches, after which the memory is looked at
-  for (std::size_t begin = 0; begin < missing.size() && byte_count_ < kMemory; begin += kBatch) {
-    const std::size_t end = std::min(missing.size(), begin + kBatch);
-    parallel_indices(end - begin, 1, [&](std::size_t k) { link(missing[begin + k]); });
-    for (std::size_t k = begin; k < end; ++k) {
-      const Link& made = links_[missing[k]];
-      byte_count_ += sizeof(int) * (made.block.size() + made.near_point.size()) + made.seen.size() +
-                     sizeof(float) * made.near_weight.size();
+  for (std::size_t begin = 0; begin < slots.size() && byte_count() < kMemory; begin += kBatch)
+    links_of({slots.begin() + static_cast<std::ptrdiff_t>(begin),
+              slots.begin() + static_cast<std::ptrdiff_t>(std::min(slots.size(), begin + kBatch))});
+}
+
+std::size_t PointLinks::byte_count() const {
+  const std::lock_guard lock(mutex_);
+  return byte_count_;
+}
+
+// The links of some patches, found now if need be. Without room for more, what other conditions needed is given up.
+std::vector<std::shared_ptr<const PointLinks::Link>> PointLinks::links_of(const std::vector<int>& slots) const {
+  std::vector<std::shared_ptr<const Link>> found(slots.size());
+  std::vector<std::size_t> missing;
+  {
+    const std::lock_guard lock(mutex_);
+    for (std::size_t k = 0; k < slots.size(); ++k) {
+      found[k] = links_[slots[k]];
+      if (!found[k]) missing.push_back(k);
     }
   }
+  if (missing.empty()) return found;
+  parallel_indices(missing.size(), 1,
+                   [&](std::size_t k) { found[missing[k]] = std::make_shared<const Link>(link(slots[missing[k]])); });
+  const std::lock_guard lock(mutex_);
+  for (const std::size_t k : missing) {
+    const Link& made = *found[k];
+    if (links_[slots[k]]) continue;
+    if (byte_count_ >= kMemory) {
+      std::fill(links_.begin(), links_.end(), nullptr);
+      byte_count_ = 0;
+    }
+    byte_count_ += sizeof(int) * (made.block.size() + made.near_point.size()) + made.seen.size() +
+                   sizeof(float) * made.near_weight.size();
+    links_[slots[k]] = found[k];
+  }
+  return found;
 }
 
 PointLinks::LitPatch PointLinks::lit_patch(const std::vector<BrightElement>& bright, std::size_t first,
@@ -168,8 +193,7 @@ PointLinks::LitPatch PointLinks::lit_patch(const std::vector<BrightElement>& bri
   const Slot slot = mesh_.slot(slot_index);
   const Face& face = mesh_.faces().faces[slot.face];
   const glm::vec2 middle = mesh_.grid(slot.face).is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3);
-  LitPatch patch{&links_[slot_index], first, last, glm::vec3(0), slot.side == 0 ? face.normal : -face.normal,
-                 glm::vec3(0)};
+  LitPatch patch{nullptr, first, last, glm::vec3(0), slot.side == 0 ? face.normal : -face.normal, glm::vec3(0)};
   float sum = 0;
   for (std::size_t k = first; k < last; ++k) {
     const int element = bright[k].element % per_slot;
@@ -185,26 +209,20 @@ PointLinks::LitPatch PointLinks::lit_patch(const std::vector<BrightElement>& bri
   return patch;
 }
 
-void PointLinks::add_irradiance(const std::vector<BrightElement>& bright, std::vector<glm::vec3>& irradiance) {
+void PointLinks::add_irradiance(const std::vector<BrightElement>& bright, std::vector<glm::vec3>& irradiance) const {
   const int per_slot = mesh_.elements_per_slot();
   std::vector<int> slots;
   for (const BrightElement& b : bright)
     if (slots.empty() || slots.back() != b.element / per_slot) slots.push_back(b.element / per_slot);
-  // Without room for more, what other conditions needed is given up.
-  if (byte_count_ >= kMemory) {
-    std::fill(links_.begin(), links_.end(), Link{});
-    byte_count_ = 0;
-  }
-  for (const int slot : slots)
-    if (!links_[slot].is_ready) {
-      prepare(slots);
-      break;
-    }
+  const std::vector<std::shared_ptr<const Link>> links = links_of(slots);
   std::vector<LitPatch> lit(slots.size());
   std::vector<std::size_t> first{0};
   for (std::size_t k = 1; k <= bright.size(); ++k)
     if (k == bright.size() || bright[k].element / per_slot != bright[k - 1].element / per_slot) first.push_back(k);
-  parallel_indices(slots.size(), 16, [&](std::size_t k) { lit[k] = lit_patch(bright, first[k], first[k + 1]); });
+  parallel_indices(slots.size(), 16, [&](std::size_t k) {
+    lit[k] = lit_patch(bright, first[k], first[k + 1]);
+    lit[k].link = links[k];
+  });
 
   const std::size_t block_count = x_.size() / kBlock;
   parallel_indices((block_count + kBlocksAtOnce - 1) / kBlocksAtOnce, 1, [&](std::size_t chunk) {

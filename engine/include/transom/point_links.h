@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <memory>
+#include <mutex>
 #include <vector>
 
 #include "transom/first_bounce.h"
@@ -21,33 +23,33 @@ class PointLinks {
   PointLinks(const LightMesh& mesh, const RayScene& rays, const std::vector<Node>& points);
 
   /// Links the patches of these slots to all points, as far as memory allows.
-  void prepare(const std::vector<int>& slots);
+  void prepare(const std::vector<int>& slots) const;
 
   /// Adds to the irradiance of every point [lx] what the bright elements send to it; elements of one slot stand
-  /// together. Links what has not been linked.
-  void add_irradiance(const std::vector<BrightElement>& bright, std::vector<glm::vec3>& irradiance);
+  /// together. Links what has not been linked. Threads may ask at once.
+  void add_irradiance(const std::vector<BrightElement>& bright, std::vector<glm::vec3>& irradiance) const;
 
   /// Memory held by links [bytes].
-  std::size_t byte_count() const { return byte_count_; }
+  std::size_t byte_count() const;
 
  private:
   static constexpr std::size_t kBlock = 64;  // points
   /// What one patch is to all points. A seen share T is stored as 255 sqrt(T): 1 is exact, dark glass keeps its digits.
   struct Link {
-    bool is_ready = false;
     std::vector<int> block;          // blocks of points in front of the patch, ascending
     std::vector<std::uint8_t> seen;  // kBlock for each of them: of far points; 0 for near ones
     std::vector<int> near_point;     // ascending
     std::vector<float> near_weight;  // for each near point, by element: irradiance per radiosity
   };
   struct LitPatch {
-    const Link* link;
+    std::shared_ptr<const Link> link;
     std::size_t first_bright, last_bright;
     glm::vec3 centroid, normal;  // of the light
     glm::vec3 flux;              // reflected [lm], over pi
   };
   glm::vec3 exposed_middle(int slot, glm::vec3 normal) const;
-  void link(int slot);
+  std::vector<std::shared_ptr<const Link>> links_of(const std::vector<int>& slots) const;
+  Link link(int slot) const;
   void link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points) const;
   void link_near(Link& link, int slot, glm::vec3 normal) const;
   LitPatch lit_patch(const std::vector<BrightElement>& bright, std::size_t first, std::size_t last) const;
@@ -56,8 +58,11 @@ class PointLinks {
   const RayScene& rays_;
   std::size_t point_count_;
   std::vector<float> x_, y_, z_, nx_, ny_, nz_;  // of the points, padded to whole blocks
-  std::vector<Link> links_;                      // by slot
-  std::size_t byte_count_ = 0;
+
+  // What has been found is kept. It changes no answer, only what the next one costs.
+  mutable std::mutex mutex_;
+  mutable std::vector<std::shared_ptr<const Link>> links_;  // by slot
+  mutable std::size_t byte_count_ = 0;
 };
 
 }  // namespace transom
