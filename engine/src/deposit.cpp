@@ -33,10 +33,14 @@ DirectLight::DirectLight(const LightMesh& mesh, const RayScene& rays, const std:
     sources_.push_back({glm::vec3(source.position - mesh.faces().origin), source.intensity});
 }
 
-void DirectLight::beam_transmission(glm::vec3 direction, std::span<const glm::vec3> points,
+void DirectLight::beam_transmission(const Beam& beam, std::span<const glm::vec3> points,
                                     std::span<float> share) const {
+  if (beam.opening >= 0) {
+    shaft_transmission(beam, points, share);
+    return;
+  }
   std::vector<Ray> rays(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) rays[i] = {points[i], direction};
+  for (std::size_t i = 0; i < points.size(); ++i) rays[i] = {points[i], beam.direction_to_source};
   std::vector<std::uint8_t> blocked(points.size());
   rays_.occluded(RayScene::What::kOpaque, rays, blocked, RayScene::Order::kCoherent);
   std::vector<Ray> free_rays;
@@ -67,7 +71,7 @@ glm::vec3 DirectLight::illuminance(const std::vector<Beam>& beams, glm::vec3 poi
     const float cosine = glm::dot(beam.direction_to_source, normal);
     if (cosine <= 0) continue;
     float share = 0;
-    beam_transmission(beam.direction_to_source, {&point, 1}, {&share, 1});
+    beam_transmission(beam, {&point, 1}, {&share, 1});
     sum += beam.normal_illuminance * (cosine * share);
   }
   return sum;
@@ -106,21 +110,21 @@ std::vector<glm::vec3> DirectLight::points_on(int slot_index, std::span<const in
 
 // Mean share of a beam on each element of a slot. Few samples tell patches that are wholly lit or dark from the others,
 // which are sampled densely throughout: light thinner than the distance of samples is then missed and found alike.
-void DirectLight::beam_on_slot(glm::vec3 direction, int slot_index, std::uint32_t seed,
-                               std::vector<float>& mean) const {
+void DirectLight::sun_on_slot(const Beam& sun, int slot_index, std::uint32_t seed, std::vector<float>& mean) const {
+  const glm::vec3 direction = sun.direction_to_source;
   const int element_count = mesh_.elements_per_slot();
   std::vector<int> elements(static_cast<std::size_t>(element_count));
   std::iota(elements.begin(), elements.end(), 0);
   std::vector<float> share(static_cast<std::size_t>(element_count * kSamplesPerElement));
   std::vector<glm::vec3> points = points_on(slot_index, elements, kSamplesPerElement, seed);
-  beam_transmission(direction, points, share);
+  beam_transmission(sun, points, share);
   ignore_small_openings(direction, points, share);
   const auto [least, most] = std::minmax_element(share.begin(), share.end());
   mean.assign(static_cast<std::size_t>(element_count), *most);
   if (*most - *least <= kSameShare) return;
   share.resize(elements.size() * kRefinedSamplesPerElement);
   points = points_on(slot_index, elements, kRefinedSamplesPerElement, seed);
-  beam_transmission(direction, points, share);
+  beam_transmission(sun, points, share);
   ignore_small_openings(direction, points, share);
   for (std::size_t k = 0; k < elements.size(); ++k)
     mean[elements[k]] = std::accumulate(&share[k * kRefinedSamplesPerElement],
@@ -139,7 +143,11 @@ void DirectLight::deposit_on_slot(const std::vector<Beam>& beams, int slot_index
   for (const Beam& beam : beams) {
     const float cosine = glm::dot(beam.direction_to_source, normal);
     if (cosine <= 0 || beam.normal_illuminance == glm::vec3(0)) continue;
-    beam_on_slot(beam.direction_to_source, slot_index, seed, mean);
+    if (beam.opening < 0)
+      sun_on_slot(beam, slot_index, seed, mean);
+    else
+      lobe_on_slot(beam, slot_index, seed, mean);
+    if (mean.empty()) continue;
     sum.resize(static_cast<std::size_t>(element_count), glm::vec3(0));
     for (int e = 0; e < element_count; ++e) sum[e] += beam.normal_illuminance * (cosine * mean[e]);
   }
@@ -183,6 +191,7 @@ std::map<int, glm::vec3> DirectLight::send_through_small_openings(const std::vec
   std::vector<Hit> hits(kRaysPerSmallOpening);
   for (const int f : small_openings_)
     for (const Beam& beam : beams) {
+      if (beam.opening >= 0) continue;
       const Face& face = mesh_.faces().faces[f];
       const float cosine = glm::dot(face.normal, beam.direction_to_source);
       if (std::abs(cosine) < kGrazingCosine) continue;
@@ -194,7 +203,7 @@ std::map<int, glm::vec3> DirectLight::send_through_small_openings(const std::vec
         places[i] = face.position(face.is_quad ? u : sample_triangle(u)) + beyond;
         onwards[i] = {places[i], -beam.direction_to_source};
       }
-      beam_transmission(beam.direction_to_source, places, share);
+      beam_transmission(beam, places, share);
       rays_.intersect(RayScene::What::kAll, onwards, hits);
       const float flux_share = face.area * std::abs(cosine) / static_cast<float>(kRaysPerSmallOpening);
       for (std::size_t i = 0; i < hits.size(); ++i) {

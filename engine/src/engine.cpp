@@ -37,7 +37,8 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
         choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
     facts_.maximum_edge_m = *std::min_element(edges.begin(), edges.end());
     mesh_ = std::make_unique<LightMesh>(faces_, edges, options_.elements_per_edge);
-    gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_);
+    panels_ = std::make_unique<Panels>(faces_, scene_.materials, scene_.openings);
+    gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_, *panels_);
     const float element_edge = facts_.maximum_edge_m / static_cast<float>(options_.elements_per_edge);
     direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources, scene_.materials,
                                                   element_edge * element_edge);
@@ -49,6 +50,7 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
   {
     const TracePhase phase(trace_, "patches");
     patch_of_slot_.assign(static_cast<std::size_t>(mesh_->slot_count()), -1);
+    gather_panels();
     find_patches(first_wave(), rows);
     mark_interior(rows);
     find_unseen_patches(rows);
@@ -59,6 +61,7 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
     divisions = cell_divisions(rows);
     assemble_transfer(rows);
     rows.clear();
+    link_panels();
   }
   if (options_.method == Method::kClassic) {
     const TracePhase phase(trace_, "forward rays");

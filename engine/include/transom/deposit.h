@@ -22,7 +22,7 @@ struct LitElement {
 ///
 /// Elements look for the sun through openings. An opening that is smaller than an element would be missed by most of
 /// their samples: its light is sent from the opening instead. Light belongs to the first opening that a point sees on
-/// its way to the sun, so that none is counted twice.
+/// its way to the sun, so that none is counted twice. Lobes come in shafts, whose part of an element is found exactly.
 class DirectLight {
  public:
   /// small_opening_m2: area of an element; opening faces below it send their light themselves.
@@ -34,9 +34,9 @@ class DirectLight {
   std::vector<LitElement> deposit(const std::vector<Beam>& beams, const std::vector<int>& slots,
                                   std::uint32_t seed) const;
 
-  /// Share of a beam that arrives at lifted points: 0 where something opaque intervenes, else the transmittance.
-  void beam_transmission(glm::vec3 direction_to_source, std::span<const glm::vec3> points,
-                         std::span<float> share) const;
+  /// Share of a beam that arrives at lifted points: 0 where something opaque intervenes, else the transmittance. Of a
+  /// lobe: what the openings before its panel leave, where the panel is the first opening that the point sees.
+  void beam_transmission(const Beam& beam, std::span<const glm::vec3> points, std::span<float> share) const;
 
   /// Direct illuminance at a lifted point with a shading normal [lx].
   glm::vec3 illuminance(const std::vector<Beam>& beams, glm::vec3 point, glm::vec3 normal) const;
@@ -49,7 +49,9 @@ class DirectLight {
     glm::vec3 position, intensity;
   };
   std::vector<glm::vec3> points_on(int slot, std::span<const int> elements, int samples, std::uint32_t seed) const;
-  void beam_on_slot(glm::vec3 direction, int slot, std::uint32_t seed, std::vector<float>& mean) const;
+  void shaft_transmission(const Beam& lobe, std::span<const glm::vec3> points, std::span<float> share) const;
+  void sun_on_slot(const Beam& sun, int slot, std::uint32_t seed, std::vector<float>& mean) const;
+  void lobe_on_slot(const Beam& lobe, int slot, std::uint32_t seed, std::vector<float>& mean) const;
   void deposit_on_slot(const std::vector<Beam>& beams, int slot, std::uint32_t seed,
                        std::vector<LitElement>& lit) const;
 
