@@ -41,20 +41,19 @@ Lighting Engine::begin_relight(Condition condition, const Lighting* previous) co
         lighting.patch_sky[p] = sky_light(lighting, patch_sky_, p);
       }
     const std::vector<Beam>& beams = lighting.condition.beams;
-    std::vector<LitElement> lit = direct_light_->deposit(beams, outdoors, hash_seed(options_.seed, kForwardStream));
+    std::vector<LitElement> lit =
+        direct_light_->deposit(beams, direct_light_->receivers(outdoors, {}), hash_seed(options_.seed, kForwardStream));
     if (!scene_.point_sources.empty()) {
       std::vector<int> indoors;
       for (std::size_t p = 0; p < n; ++p)
         if (is_interior_[p]) indoors.push_back(slot_of_patch_[p]);
       const std::vector<LitElement> more =
-          direct_light_->deposit({}, indoors, hash_seed(options_.seed, kForwardStream));
+          direct_light_->deposit({}, direct_light_->receivers(indoors, {}), hash_seed(options_.seed, kForwardStream));
       lit.insert(lit.end(), more.begin(), more.end());
     }
     for (const LitElement& e : lit) {
       const int patch = patch_of_slot_[e.element / per_slot];
-      const Slot slot = mesh_->slot(e.element / per_slot);
-      lighting.patch_sun[patch] +=
-          e.illuminance * (mesh_->element_area(slot.face, slot.cell, e.element % per_slot) / patch_area_[patch]);
+      lighting.patch_sun[patch] += e.illuminance * element_share_[patch * per_slot + e.element % per_slot];
     }
     // Panels pass on what surfaces outdoors reflect of their direct light.
     std::vector<glm::vec3> radiosity(n, glm::vec3(0));

@@ -67,25 +67,30 @@ void DirectLight::shaft_transmission(const Beam& lobe, std::span<const glm::vec3
     if (blocked[k]) share[index[k]] = 0;
 }
 
-// Mean share of a lobe on each element of a slot; empty if it has none.
+// Receivers whose corners' box a shaft may meet, on the side that faces the lobe.
+std::vector<char> DirectLight::reach_of_lobe(const Beam& lobe, const Receivers& receivers) const {
+  std::vector<char> reached(receivers.slots.size(), 0);
+  for (std::size_t i = 0; i < reached.size() && !lobe.shafts->empty(); ++i) {
+    if (glm::dot(lobe.direction_to_source, receivers.normals[i]) <= 0) continue;
+    const Corners& corner = receivers.corners[i];
+    const glm::vec3 low = glm::min(glm::min(corner[0], corner[1]), glm::min(corner[2], corner[3]));
+    const glm::vec3 high = glm::max(glm::max(corner[0], corner[1]), glm::max(corner[2], corner[3]));
+    reached[i] = std::any_of(lobe.shafts->begin(), lobe.shafts->end(),
+                             [&](const LightShaft& shaft) { return shaft.may_meet(low, high); });
+  }
+  return reached;
+}
+
+// Mean share of a lobe on each element of a slot.
 void DirectLight::lobe_on_slot(const Beam& lobe, int slot_index, std::uint32_t seed, std::vector<float>& mean) const {
-  mean.clear();
+  mean.assign(static_cast<std::size_t>(mesh_.elements_per_slot()), 0.f);
   const Slot slot = mesh_.slot(slot_index);
-  const bool is_quad = mesh_.grid(slot.face).is_quad;
-  const auto cell_corner = [&](float u, float v) {
-    return mesh_.lifted_position(slot.face, slot.side, mesh_.cell_parameters(slot.face, slot.cell, {u, v}));
-  };
-  const glm::vec3 corner[4]{cell_corner(0, 0), cell_corner(1, 0), cell_corner(0, 1),
-                            is_quad ? cell_corner(1, 1) : cell_corner(0, 0)};
-  const glm::vec3 low = glm::min(glm::min(corner[0], corner[1]), glm::min(corner[2], corner[3]));
-  const glm::vec3 high = glm::max(glm::max(corner[0], corner[1]), glm::max(corner[2], corner[3]));
   const Face& face = mesh_.faces().faces[static_cast<std::size_t>(slot.face)];
   const glm::vec3 lift = mesh_.faces().ray_offset() * (slot.side == 0 ? face.normal : -face.normal);
   std::vector<LitPart> parts;
   std::vector<Ray> rays;
   std::vector<std::uint8_t> blocked;
   for (const LightShaft& shaft : *lobe.shafts) {
-    if (!shaft.may_meet(low, high)) continue;
     parts.clear();
     for (int e = 0; e < mesh_.elements_per_slot(); ++e) {
       ElementShape shape = element_shape(mesh_, slot_index * mesh_.elements_per_slot() + e);
@@ -116,7 +121,6 @@ void DirectLight::lobe_on_slot(const Beam& lobe, int slot_index, std::uint32_t s
     const auto dark = std::count(blocked.begin(), blocked.end(), 1);
     if (dark == static_cast<std::ptrdiff_t>(blocked.size())) continue;
     if (dark > 0) cast(count = kRefinedRaysPerPart);
-    if (mean.empty()) mean.assign(static_cast<std::size_t>(mesh_.elements_per_slot()), 0.f);
     for (std::size_t k = 0; k < parts.size(); ++k) {
       const auto first = blocked.begin() + static_cast<std::ptrdiff_t>(k * count);
       const auto seen = std::count(first, first + static_cast<std::ptrdiff_t>(count), 0);

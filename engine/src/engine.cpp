@@ -106,16 +106,21 @@ void Engine::assemble_transfer(std::vector<GatherRow>& rows) {
   patch_reflectance_.resize(n);
   patch_emitted_.resize(n);
   std::vector<float> row_sums(n);
+  std::vector<char> is_behind_openings(n);
   for (std::size_t p = 0; p < n; ++p) {
     const Slot slot = mesh_->slot(slot_of_patch_[p]);
     patch_area_[p] = std::max(1e-6f, rows[p].exposure) * mesh_->cell_area(slot.face, slot.cell);
+    for (int e = 0; e < mesh_->elements_per_slot(); ++e)
+      element_share_.push_back(mesh_->element_area(slot.face, slot.cell, e) / patch_area_[p]);
     patch_reflectance_[p] = reflectance(slot.face, slot.side);
     patch_emitted_[p] = kPi * scene_.materials[faces_.faces[slot.face].material].luminance;
     row_sums[p] = is_interior_[p] ? 1.f : 1.f - rows[p].escaped;
+    is_behind_openings[p] = is_interior_[p] && rows[p].escaped == 0;
     form_factors_.append(to_patches(rows[p].reached));
     through_.append(to_patches(rows[p].through));
     patch_sky_.append(rows[p].sky);
   }
+  receivers_ = beam_light_->receivers(slot_of_patch_, std::move(is_behind_openings));
   double emitting = 0, interior = 0;
   for (std::size_t p = 0; p < n; ++p) {
     if (is_interior_[p]) interior += patch_area_[p];
@@ -191,7 +196,7 @@ std::vector<int> Engine::beam_slots() const {
 
 void Engine::light_always() {
   const int per_slot = mesh_->elements_per_slot();
-  lit_by_sources_ = direct_light_->deposit({}, slot_of_patch_, hash_seed(options_.seed, kBeamStream));
+  lit_by_sources_ = direct_light_->deposit({}, receivers_, hash_seed(options_.seed, kBeamStream));
   bright_always_ = bright_elements(lit_by_sources_);
   if (connects_emitters_)
     for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)

@@ -61,7 +61,7 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
   std::vector<LitElement>& lit = lighting.lit_elements;
   {
     const TracePhase phase(trace_, "beams");
-    lit = beam_light_->deposit(lighting.condition.beams, slot_of_patch_, hash_seed(options_.seed, kBeamStream));
+    lit = beam_light_->deposit(lighting.condition.beams, receivers_, hash_seed(options_.seed, kBeamStream));
     lighting.bright_elements = bright_elements(lit);
   }
   std::vector<glm::vec3>& sun = lighting.patch_sun;
@@ -78,9 +78,7 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
     const TracePhase phase(trace_, "interreflection");
     for (const LitElement& e : lit) {
       const int patch = patch_of_slot_[e.element / per_slot];
-      const Slot slot = mesh_->slot(e.element / per_slot);
-      sun[patch] +=
-          e.illuminance * (mesh_->element_area(slot.face, slot.cell, e.element % per_slot) / patch_area_[patch]);
+      sun[patch] += e.illuminance * element_share_[patch * per_slot + e.element % per_slot];
     }
     solve_with_panels(residual, lighting);
     lighting.patch_smooth_radiosity.resize(n);

@@ -164,11 +164,13 @@ class Engine {
   // Patches: the slots that take part.
   std::vector<int> patch_of_slot_;  // -1: takes no part
   std::vector<int> slot_of_patch_;
-  std::vector<float> patch_area_;  // exposed part [m²]
+  std::vector<float> patch_area_;     // exposed part [m²]
+  std::vector<float> element_share_;  // of that area: patch * elements_per_slot + element
   std::vector<glm::vec3> patch_reflectance_, patch_emitted_;
   std::vector<char> is_interior_;
-  std::vector<int> unseen_slots_;   // that see patches indoors and were seen by none
-  bool connects_emitters_ = false;  // small emitters: found by connection, not by rays
+  DirectLight::Receivers receivers_;  // all patches
+  std::vector<int> unseen_slots_;     // that see patches indoors and were seen by none
+  bool connects_emitters_ = false;    // small emitters: found by connection, not by rays
   SparseRows form_factors_, through_, patch_sky_;
   std::unique_ptr<Interreflection> interreflection_;
 
