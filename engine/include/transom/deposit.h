@@ -64,11 +64,12 @@ class DirectLight {
   using Corners = std::array<glm::vec3, 4>;
   std::vector<glm::vec3> points_on(int slot, const Corners& corners, std::span<const int> elements, int samples,
                                    const Patterns& patterns) const;
-  /// Which receivers each beam may reach.
-  std::vector<std::vector<char>> reach(const std::vector<Beam>& beams, const Receivers& receivers) const;
-  bool is_partly_lit(int slot, int element, std::span<const float> share) const;
-  void beam_on_slot(glm::vec3 direction, int slot, const Corners& corners, const Patterns& patterns,
-                    std::vector<float>& mean) const;
+  std::vector<std::size_t> reached(glm::vec3 direction, const Receivers& receivers) const;
+  std::vector<float> sample_beam(glm::vec3 direction, const Receivers& receivers,
+                                 const std::vector<std::size_t>& candidates, const Patterns& patterns) const;
+  std::vector<int> partly_lit(int slot, const std::vector<int>& place_of_slot, const std::vector<float>& share) const;
+  void add_beam(const Beam& beam, const Receivers& receivers, const Patterns& patterns,
+                std::vector<std::vector<glm::vec3>>& sum) const;
   void sources_on_slot(int slot, const Corners& corners, glm::vec3 normal, const Patterns& patterns,
                        std::vector<glm::vec3>& sum) const;
 
