@@ -3,6 +3,7 @@
 
 #include <glm/glm.hpp>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -70,16 +71,16 @@ class Engine {
   Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions options);
   ~Engine();
 
-  /// The light of a condition: everything but the image. Any number of threads may ask at once.
-  /// previous: kClassic alone replaces its light step by step, so that the answer depends on it within the tolerance of
-  /// shooting; null: from darkness.
-  std::shared_ptr<const Lighting> relight(Condition condition, const Lighting* previous = nullptr) const;
+  /// The light of a condition: everything but the image. Any number of threads may ask at once. Throws InputError for
+  /// light that is negative or not finite.
+  /// previous: light whose indirect part the first states show; kClassic starts from it and replaces it step by step,
+  /// so that its answer depends on it within the tolerance of shooting. Null: from darkness. follower: takes the states
+  /// on the way; null: none. The answer is null where it has abandoned the relighting.
+  std::shared_ptr<const Lighting> relight(Condition condition, const Lighting* previous = nullptr,
+                                          RelightFollower* follower = nullptr) const;
 
-  /// kClassic: relights step by step. The direct light is that of the new condition at once; `continue_relight` shoots
-  /// at most `shots` times, replaces the old condition's indirect light by as much, and says whether more is to come.
-  /// Throws InputError for another method.
-  Lighting begin_relight(Condition condition, const Lighting* previous) const;
-  bool continue_relight(Lighting& lighting, int shots) const;
+  /// Throws InputError for a condition that `relight` would refuse.
+  void check(const Condition& condition) const { condition.validate(sky_index_->count() - 1); }
 
   /// What points (world coordinates [m]) with normals see: found once, asked under any light.
   Sensors sensors(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
@@ -125,12 +126,19 @@ class Engine {
   std::vector<int> cell_divisions(const std::vector<GatherRow>& rows) const;
   void gather_nodes(const std::vector<int>& divisions);
   void solve_classic();
+  std::shared_ptr<const Lighting> relight_classic(Condition condition, const Lighting* previous,
+                                                  RelightFollower* follower) const;
+  Lighting direct_classic(Condition condition, const Lighting* previous) const;
   void show_classic(Lighting& lighting) const;
+  Lighting direct_light_of(Condition condition) const;
+  std::shared_ptr<const Lighting> with_indirect_of(Lighting lighting, const Lighting* previous) const;
+  void find_smooth_radiosity(Lighting& lighting) const;
+  void gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& first_reflection) const;
   std::vector<Share> to_patches(const std::vector<Share>& elements) const;
   glm::vec3 sky_light(const Condition& condition, const SparseRows& rows, std::size_t row) const;
   void light_always();
   std::vector<int> beam_slots() const;
-  std::vector<BrightElement> bright_elements(const std::vector<LitElement>& lit) const;
+  std::vector<BrightElement> bright_elements(std::span<const LitElement> lit) const;
   std::vector<glm::vec3> element_direct(const Lighting& lighting) const;
 
   SceneGeometry scene_;
