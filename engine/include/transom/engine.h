@@ -135,6 +135,7 @@ class Engine {
   void gather_nodes(const std::vector<int>& divisions);
   void gather_panels();
   void link_panels();
+  void balance_panels();
   void solve_classic();
   void show_classic(Lighting& lighting) const;
   std::vector<Share> to_patches(const std::vector<Share>& elements) const;
