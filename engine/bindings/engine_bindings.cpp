@@ -57,6 +57,7 @@ struct Session {
   const Lighting* previous() const { return present->shooting.unshot.empty() ? nullptr : present.get(); }
   Session(SceneGeometry scene, const SkyBins& bins, SolveOptions options)
       : engine(std::move(scene), bins, options), renderer(engine) {}
+  Session(const Session& solved, SceneGeometry scene) : engine(solved.engine, std::move(scene)), renderer(engine) {}
 };
 
 // At most so many threads while a `with` block lasts.
@@ -128,13 +129,13 @@ NB_MODULE(_engine, m) {
       .def(
           "add_panels",
           [](SceneGeometry& s, In<float, nb::shape<3, 3>> axes, In<float, nb::ndim<1>> polar_edges,
-             In<int, nb::ndim<1>> counts) {
+             In<int, nb::ndim<1>> counts, float diffuse_reflectance) {
             const std::vector<glm::vec3> rows = to_vector<glm::vec3>(axes);
-            s.openings.push_back({std::vector<float>(2, 0.f), 0.f,
+            s.openings.push_back({std::vector<float>(2, 0.f), diffuse_reflectance,
                                   PanelFrame{rows[0], rows[1], rows[2],
                                              AngleBins(to_vector<float>(polar_edges), to_vector<int>(counts))}});
           },
-          "axes"_a, "polar_edges"_a, "counts"_a,
+          "axes"_a, "polar_edges"_a, "counts"_a, "diffuse_reflectance"_a,
           "An opening group that holds a product; rows x, y, z of its frame in the world, bins of its directions.")
       .def(
           "add_point_source",
@@ -192,7 +193,9 @@ NB_MODULE(_engine, m) {
       .def_ro("cluster_count", &SolveFacts::cluster_count)
       .def_ro("link_bytes", &SolveFacts::link_bytes)
       .def_ro("panel_count", &SolveFacts::panel_count)
-      .def_ro("panel_bin_count", &SolveFacts::panel_bin_count);
+      .def_ro("panel_bin_count", &SolveFacts::panel_bin_count)
+      .def_ro("kept_patch_rows", &SolveFacts::kept_patch_rows)
+      .def_ro("kept_node_rows", &SolveFacts::kept_node_rows);
 
   nb::class_<Condition>(m, "Condition")
       .def(
@@ -261,6 +264,8 @@ NB_MODULE(_engine, m) {
   nb::class_<Session>(m, "Engine")
       .def(nb::init<SceneGeometry, const SkyBins&, SolveOptions>(), "scene"_a, "sky_bins"_a, "options"_a,
            nb::call_guard<nb::gil_scoped_release>(), "Solves the scene: everything that depends on geometry alone.")
+      .def(nb::init<const Session&, SceneGeometry>(), "solved"_a, "scene"_a, nb::call_guard<nb::gil_scoped_release>(),
+           "Solves an edited scene, and takes over what is still valid: equal to solving it afresh.")
       .def_prop_ro("facts", [](const Session& s) { return s.engine.facts(); })
       .def(
           "set_product",

@@ -15,7 +15,7 @@ void Engine::solve_classic() {
   forward_rays_ = std::make_unique<ForwardRays>(*mesh_, *rays_, scene_.materials, scene_.openings, *panels_,
                                                 ForwardRayCounts{}, hash_seed(options_.seed, kForwardStream));
   shooting_ =
-      std::make_unique<ProgressiveRadiosity>(form_factors_, through_, patch_area_, patch_reflectance_, patch_emitted_);
+      std::make_unique<ProgressiveRadiosity>(*form_factors_, through_, patch_area_, patch_reflectance_, patch_emitted_);
   connects_emitters_ = false;
 }
 

@@ -93,7 +93,7 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
     for (std::size_t p = 0; p < n; ++p) radiosity[p] = glm::vec4(lighting.patch_smooth_radiosity[p], 0);
     parallel_indices(node_count, 64, [&](std::size_t i) {
       lighting.node_sky[i] = sky_light(lighting, node_sky_, i);
-      lighting.node_indirect[i] += glm::vec3(node_patches_.dot(i, radiosity));
+      lighting.node_indirect[i] += glm::vec3(node_rows_->patches.dot(i, radiosity) + node_through_.dot(i, radiosity));
     });
   }
   return result;

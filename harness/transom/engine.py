@@ -114,6 +114,21 @@ class Engine:
         engine._set_products()
         return engine
 
+    def edited(self, scene: Scene) -> Self:
+        """An engine for the edited scene: equal to a fresh solve with this one's options, and faster.
+
+        What the edit leaves valid is taken over (`facts()["kept"]`): a reflectance or a luminance costs no ray, glazing
+        or a closed opening only rays through openings. transom.edits makes such scenes. This engine stays as it is. The
+        new one has no light yet. Raises InputError for a room that is not closed.
+        """
+        try:
+            core = _engine.Engine(self._core, _geometry(scene))
+        except _engine.EngineInputError as error:
+            raise InputError(_with_object_names(str(error), scene), file=scene.file) from None
+        engine = type(self)(scene, self.options, self.sky_bins, core)
+        engine._set_products()
+        return engine
+
     def relight(self, condition: Condition) -> None:
         """Finds the light of a condition; the geometry is not looked at again.
 
@@ -256,6 +271,7 @@ class Engine:
             "link_bytes": facts.link_bytes,
             "panels": facts.panel_count,
             "panel_bins": facts.panel_bin_count,
+            "kept": {"patch_rows": facts.kept_patch_rows, "node_rows": facts.kept_node_rows},
             "form_factor_defects": {
                 "raw_reciprocity": defects.raw_reciprocity,
                 "raw_row_sum": defects.raw_row_sum,
@@ -353,11 +369,13 @@ def _geometry(scene: Scene) -> _engine.SceneGeometry:
         geometry.add_opening(transmittance_table(opening), 0.0 if opening.product else diffuse_reflectance(opening))
     for index, group in enumerate(groups):  # one orientation each, after the openings of the scene
         geometry.add_material((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, len(scene.openings) + index)
-        basis = _fenestration(scene, group.opening).basis
+        fenestration = _fenestration(scene, group.opening)
+        basis = fenestration.basis
         geometry.add_panels(
             np.ascontiguousarray(group.axes, dtype=np.float32),
             np.radians(basis.edges_deg).astype(np.float32),
             np.asarray(basis.counts, dtype=np.int32),
+            fenestration.room_reflectance(),
         )
     for source in scene.point_sources:
         geometry.add_point_source(source.position, source.intensity)

@@ -22,6 +22,8 @@ class AngleBins {
   /// Integral of cos(theta) over a bin [sr]; their sum is pi.
   float projected_solid_angle(int bin) const { return projected_solid_angles_[static_cast<std::size_t>(bin)]; }
 
+  bool operator==(const AngleBins&) const = default;
+
   /// Direction of a bin, z > 0, with density cos(theta) / projected solid angle.
   glm::vec3 sample(int bin, glm::vec2 u) const;
 
@@ -37,6 +39,7 @@ struct PanelFrame {
   glm::vec3 x{1, 0, 0}, y{0, 1, 0}, z{0, 0, 1};
   AngleBins bins;
 
+  bool operator==(const PanelFrame&) const = default;
   glm::vec3 to_panel(glm::vec3 direction) const {
     return {glm::dot(direction, x), glm::dot(direction, y), glm::dot(direction, z)};
   }

@@ -49,9 +49,10 @@ struct SolveFacts {
   float maximum_edge_m = 0;
   double leak_share = 0;  ///< of the hemisphere rays of interior patches, those that met nothing
   TransferDefects defects;
-  int cluster_count = 0;       ///< of patches, for interreflection
+  int cluster_count = 0;                        ///< of patches, for interreflection
   int panel_count = 0, panel_bin_count = 0;
-  std::size_t link_bytes = 0;  ///< of what is kept of how nodes see patches
+  std::size_t link_bytes = 0;                   ///< of what is kept of how nodes see patches
+  int kept_patch_rows = 0, kept_node_rows = 0;  ///< taken over from another engine, but for what lies behind openings
 };
 
 /// Flux balance of the interior [lm], linear RGB. Interior: every side that light from the rooms' side of the openings,
@@ -71,6 +72,12 @@ class Engine {
   /// Solves: everything that depends on geometry and reflectance alone. Throws InputError for a scene that cannot be
   /// lit rightly, such as a room whose wall is open.
   Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions options);
+
+  /// Solves a scene with the options of an engine whose scene was another, and takes over what that found wherever the
+  /// edit leaves it valid: equal bit by bit to a fresh solve whose patches have the same longest edge, and faster.
+  /// Reflectance, luminance: no ray is cast anew. Glazing, or an opening closed: only rays through openings are.
+  /// `solved` is not changed and may go. Throws as above.
+  Engine(const Engine& solved, SceneGeometry scene);
   ~Engine();
 
   /// The light of a condition: everything but the image. Any number of threads may ask at once.
@@ -119,25 +126,54 @@ class Engine {
   /// Radiance reflected by every node, then by every patch, of the light of sky and of surfaces [cd/m²].
   void shown_radiance(const Lighting& lighting, std::vector<glm::vec4>& sky, std::vector<glm::vec4>& indirect) const;
 
-  const SparseRows& form_factors() const { return form_factors_; }
+  const SparseRows& form_factors() const { return *form_factors_; }
   const std::vector<float>& patch_areas() const { return patch_area_; }
   const std::vector<int>& patch_slots() const { return slot_of_patch_; }
 
  private:
+  /// What an engine of an earlier state of the scene found, as far as it is valid.
+  struct Known {
+    const Engine* engine = nullptr;
+    bool has_surroundings = false;  // faces and their cells are the same
+    bool has_openings = false;      // and so is all glazing
+    bool has_same_patches = false;  // with the same numbers
+    bool has_same_nodes = false;    // with the same numbers
+    std::vector<int> node;          // its number of each node here, or -1
+  };
+  /// What a patch sees, by slot: without looking through openings; and through them, with all of the sky.
+  struct PatchRow {
+    std::shared_ptr<const GatherRow> around, beyond;
+  };
+  /// What nodes see without looking through openings: patches, and the sky seen by itself.
+  struct NodeRows {
+    SparseRows patches, sky;
+    std::vector<float> exposure;
+  };
+
+  void solve(const Engine* solved);
+  Known known_from(const Engine* solved) const;
   std::vector<int> first_wave() const;
-  void find_patches(std::vector<int> wave, std::vector<GatherRow>& rows);
-  void find_unseen_patches(std::vector<GatherRow>& rows);
+  PatchRow patch_row(int slot, const Known& known) const;
+  void find_patches(std::vector<int> wave, const Known& known);
+  void find_unseen_patches(const Known& known);
   std::vector<int> first_slots() const;
-  void mark_interior(const std::vector<GatherRow>& rows);
-  void check_closed(const std::vector<GatherRow>& rows);
-  void assemble_transfer(std::vector<GatherRow>& rows);
-  std::vector<int> cell_divisions(const std::vector<GatherRow>& rows) const;
-  void gather_nodes(const std::vector<int>& divisions);
+  void mark_interior();
+  void check_closed();
+  void assemble_transfer(const Known& known);
+  std::vector<int> cell_divisions() const;
+  void gather_nodes(Known& known);
+  void find_known_nodes(Known& known) const;
+  std::shared_ptr<const NodeRows> node_rows(const Known& known) const;
+  void look_out_of_nodes(const Known& known);
+  void link_nodes(const Known& known);
+  std::uint32_t node_seed(const Node& node) const;
   void gather_panels();
   void link_panels();
   void balance_panels();
   void solve_classic();
   void show_classic(Lighting& lighting) const;
+  std::vector<Share> to_slots(std::vector<Share> elements) const;
+  std::vector<Share> patches_at(const std::vector<Share>& slots) const;
   std::vector<Share> to_patches(const std::vector<Share>& elements) const;
   glm::vec3 sky_light(const Lighting& lighting, const SparseRows& rows, std::size_t row) const;
   void find_shafts(Condition& condition, std::vector<glm::vec3>& residual) const;
@@ -151,11 +187,13 @@ class Engine {
   glm::dvec3 through_product(const Panel& panel, const std::vector<glm::dvec3>& arriving) const;
 
   SceneGeometry scene_;
+  SkyBins sky_bins_;
   SolveOptions options_;
   mutable Trace trace_;
   SolveFacts facts_;
   Faces faces_;
   std::unique_ptr<RayScene> rays_;
+  std::vector<float> edges_;  // longest of patches, by face [m]
   std::unique_ptr<LightMesh> mesh_;
   std::unique_ptr<SkyBinIndex> sky_index_;
   std::unique_ptr<Panels> panels_;
@@ -165,6 +203,7 @@ class Engine {
   // Patches: the slots that take part.
   std::vector<int> patch_of_slot_;  // -1: takes no part
   std::vector<int> slot_of_patch_;
+  std::vector<PatchRow> patch_rows_;
   std::vector<float> patch_area_;     // exposed part [m²]
   std::vector<float> element_share_;  // of that area: patch * elements_per_slot + element
   std::vector<glm::vec3> patch_reflectance_, patch_emitted_;
@@ -172,7 +211,8 @@ class Engine {
   DirectLight::Receivers receivers_;  // all patches
   std::vector<int> unseen_slots_;     // that see patches indoors and were seen by none
   bool connects_emitters_ = false;    // small emitters: found by connection, not by rays
-  SparseRows form_factors_, through_, patch_sky_;
+  std::shared_ptr<const SparseRows> form_factors_;
+  SparseRows through_, patch_sky_;
   std::unique_ptr<Interreflection> interreflection_;
 
   // Panels: products by opening; what arrives at each incident bin from the sky, and from elements or patches outdoors.
@@ -182,7 +222,8 @@ class Engine {
 
   // Where light is shown.
   std::unique_ptr<NodeField> nodes_;
-  SparseRows node_sky_, node_patches_;
+  std::shared_ptr<const NodeRows> node_rows_;
+  SparseRows node_sky_, node_through_;  // all of the sky; patches seen through openings
   std::unique_ptr<PointLinks> links_;
 
   // Light that no condition changes: of point sources on elements, and its first reflection, with small emitters, at

@@ -22,8 +22,16 @@ class PointLinks {
  public:
   PointLinks(const LightMesh& mesh, const RayScene& rays, const std::vector<Node>& points);
 
-  /// Links the patches of these slots to all points, as far as memory allows.
-  void prepare(const std::vector<int>& slots) const;
+  /// What has been linked in the same places.
+  struct Known {
+    const PointLinks* links = nullptr;
+    std::vector<int> point;         ///< its number of each point here, or -1
+    bool has_same_points = false;   ///< all of them, in the same order
+    bool has_same_glazing = false;  ///< else only what is seen without looking through an opening is of use
+  };
+
+  /// Links the patches of these slots to all points, as far as memory allows. known: what need not be found again.
+  void prepare(const std::vector<int>& slots, const Known& known) const;
 
   /// Adds to the irradiance of every point [lx] what the bright elements send to it; elements of one slot stand
   /// together. Links what has not been linked. Threads may ask at once.
@@ -40,6 +48,14 @@ class PointLinks {
     std::vector<std::uint8_t> seen;  // kBlock for each of them: of far points; 0 for near ones
     std::vector<int> near_point;     // ascending
     std::vector<float> near_weight;  // for each near point, by element: irradiance per radiosity
+    std::vector<int> glazed_point;   // ascending: points between which and the patch some opening stands
+    std::uint8_t seen_of(int point) const;
+    const float* near_weight_of(int point, std::size_t element_count) const;  // null: not among the near points
+  };
+  struct KnownPoints {
+    const Link* link;  // null: none is known
+    const Known& known;
+    int number(int point) const;  // -1: to be found anew
   };
   struct LitPatch {
     std::shared_ptr<const Link> link;
@@ -47,11 +63,12 @@ class PointLinks {
     glm::vec3 centroid, normal;  // of the light
     glm::vec3 flux;              // reflected [lm], over pi
   };
+  std::size_t bytes_of(const Link& link) const;
   glm::vec3 exposed_middle(int slot, glm::vec3 normal) const;
-  std::vector<std::shared_ptr<const Link>> links_of(const std::vector<int>& slots) const;
-  Link link(int slot) const;
-  void link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points) const;
-  void link_near(Link& link, int slot, glm::vec3 normal) const;
+  std::vector<std::shared_ptr<const Link>> links_of(const std::vector<int>& slots, const Known& known) const;
+  std::shared_ptr<const Link> link(int slot, const Known& known) const;
+  void link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points, const KnownPoints& known) const;
+  void link_near(Link& link, int slot, glm::vec3 normal, const KnownPoints& known) const;
   LitPatch lit_patch(const std::vector<BrightElement>& bright, std::size_t first, std::size_t last) const;
 
   const LightMesh& mesh_;
