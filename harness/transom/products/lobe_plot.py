@@ -1,7 +1,7 @@
 """Pictures of where a product sends light, as in figure 6 of Cutler et al. 2008: the room's hemisphere with its lobes.
 
-One disc an incident direction: the middle is the normal into the room, the rim its plane; up is up, and right is as seen
-from the room looking out. All discs of a picture share one printed scale.
+One disc an incident direction: the middle is the normal into the room, the rim its plane; up is up, and right is as
+seen from the room looking out. All discs of a picture share one printed scale.
 """
 
 from __future__ import annotations
