@@ -7,6 +7,7 @@ matrices act on it; here it is a pair of amplitudes, of a polarisation drawn by 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -22,6 +23,7 @@ Bool = NDArray[np.bool_]
 DIVIDES_ABOVE = 0.05
 """Weight from which a path divides; below, it goes one way by chance with all of its weight."""
 
+ARC_LINES = 48
 MAXIMUM_STEPS = 4000
 CLOSE = 1e-9
 """Of the period: a line nearer than this is the one that the path is on."""
@@ -66,7 +68,8 @@ class _Tracer:
         self.low, self.high = low - margin, high + margin
         self.index = np.array([medium[0] for medium in section.media])
         self.absorption = np.array([medium[1] for medium in section.media])
-        self.lines = [piece for line in section.lines for piece in _copies(line, self.period)]
+        straight = [piece for line in section.lines for piece in _straight(line)]
+        self.lines = [piece for line in straight for piece in _copies(line, self.period)]
         self.direction = direction / np.linalg.norm(direction)
         self.exits: list[tuple[Float64, Float64]] = []
         self.absorbed = 0.0
@@ -226,6 +229,12 @@ class _Tracer:
 
     def _absorb(self, weight: Float64) -> None:
         self.absorbed += float(weight.sum()) * self.share
+
+
+def _straight(line: Line) -> Iterator[Line]:
+    """An arc as straight lines."""
+    for a, b in itertools.pairwise(line.points(ARC_LINES)):
+        yield dataclasses.replace(line, a=a, b=b, bow=0.0)
 
 
 def _copies(line: Line, period: float) -> Iterator[Line]:
