@@ -19,6 +19,9 @@ Branch = tuple[int, int, int]
 
 NONE = -1
 
+GRAZING = 1e-6
+"""Least z of a sum of vectors: light goes into the room."""
+
 REACH_RAD = math.radians(10.0)
 REACH_PER_STEP = 2.5
 """A lobe that would turn by more than REACH_RAD + REACH_PER_STEP times the angle between the incident directions has
@@ -90,19 +93,52 @@ def with_lone(branches: Sequence[Branch], counts: Sequence[int]) -> list[Branch]
     return found
 
 
-def interpolated(corners: Sequence[Sequence[Lobe]], branches: Sequence[Branch], weights: Float64) -> list[Lobe]:
-    """Each branch at the weights (3,) of a triangle's corners: shares linear, directions as weighted sums of unit
-    vectors, of the corners where the lobe is."""
+Motions = Sequence[Sequence[Float64]]
+"""By corner and by other corner, (lobes, 3): how the vector of each lobe changes on the way there."""
+
+
+def motions(corners: Sequence[Sequence[Lobe]], links: Sequence[Sequence[dict[int, int]]]) -> Motions:
+    """links: by corner and other corner. A lobe that has no link to the other corner fades on the way, and moves as
+    the nearest that has one; without any it stays."""
+    found: list[list[Float64]] = []
+    for here, lobes in enumerate(corners):
+        vectors = np.array([lobe.direction for lobe in lobes]).reshape(-1, 3)
+        row: list[Float64] = []
+        for there, others in enumerate(corners):
+            link = links[here][there]
+            if not link or here == there:
+                row.append(np.zeros_like(vectors))
+                continue
+            starts = list(link)
+            turned = np.array([others[link[i]].direction - lobes[i].direction for i in starts])
+            row.append(turned[np.argmax(vectors @ vectors[starts].T, axis=1)])
+        found.append(row)
+    return found
+
+
+def interpolated(
+    corners: Sequence[Sequence[Lobe]], branches: Sequence[Branch], weights: Float64, moves: Motions | None = None
+) -> list[Lobe]:
+    """Each branch at the weights (3,) of a triangle's corners: shares linear, directions as sums of unit vectors.
+
+    Without `moves`, weighted sums over the corners where the lobe is. With them, each corner's lobe also moves towards
+    the corners where it is not; for a lobe that all three have, that is the same.
+    """
     found: list[Lobe] = []
     for branch in branches:
-        there = [(corners[k][i], float(weights[k])) for k, i in enumerate(branch) if i != NONE and weights[k] > 0]
-        share = sum(weight * lobe.share for lobe, weight in there)
+        there = [(k, i) for k, i in enumerate(branch) if i != NONE and weights[k] > 0]
+        lobes = [corners[k][i] for k, i in there]
+        parts = np.array([weights[k] for k, _ in there])
+        share = float(sum(part * lobe.share for part, lobe in zip(parts, lobes, strict=True)))
         if share <= 0:
             continue
-        vector = np.sum([weight * lobe.direction for lobe, weight in there], axis=0)
-        length = float(np.linalg.norm(vector))
-        if length < 1e-9:
-            continue
-        width = sum(weight * lobe.width_rad for lobe, weight in there) / sum(weight for _, weight in there)
-        found.append(Lobe(vector / length, share, width))
+        vectors = np.array([lobe.direction for lobe in lobes])
+        if moves is not None:
+            for row, (k, i) in enumerate(there):
+                vectors[row] += sum(weights[m] * moves[k][m][i] for m in range(3))
+            parts = parts * [lobe.share for lobe in lobes]
+        vector = parts @ vectors
+        vector[2] = max(vector[2], GRAZING)
+        width = float(parts @ [lobe.width_rad for lobe in lobes] / parts.sum())
+        found.append(Lobe(vector / np.linalg.norm(vector), share, width))
     return found

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transom.bsdf.directions import AngleBasis
-from transom.fenestration.correspondence import Branch, by_rank, consistent, interpolated, matched, with_lone
+from transom.fenestration.correspondence import by_rank, consistent, interpolated, matched, motions, with_lone
 from transom.fenestration.through import SunThrough
 from transom.fenestration.triangulation import SphericalTriangulation
 
@@ -44,18 +44,15 @@ class LobeTable:
         corners, weights = self.triangulation.locate(incident)
         key = tuple(int(corner) for corner in corners)
         lobes = [self.through[corner].lobes for corner in key]
-        branches = by_rank(lobes) if self.is_by_rank else self._branches((key[0], key[1], key[2]))
-        found = interpolated(lobes, branches, weights)
+        if self.is_by_rank:
+            found = interpolated(lobes, by_rank(lobes), weights)
+        else:
+            links = [[self._directed(a, b) if a != b else {} for b in key] for a in key]
+            branches, _ = consistent([links[0][1], links[1][2], links[2][0]])
+            branches = with_lone(branches, [len(of_corner) for of_corner in lobes])
+            found = interpolated(lobes, branches, weights, motions(lobes, links))
         residual = np.sum([self.through[k].residual * w for k, w in zip(key, weights, strict=True)], axis=0)
         return SunThrough(tuple(sorted(found, key=lambda lobe: -lobe.share)), residual)
-
-    def _branches(self, corners: tuple[int, int, int]) -> list[Branch]:
-        branches, _ = consistent(self._around(corners))
-        return with_lone(branches, [len(self.through[corner].lobes) for corner in corners])
-
-    def _around(self, corners: tuple[int, int, int]) -> list[dict[int, int]]:
-        """Links from corner 0 to 1, 1 to 2 and 2 to 0."""
-        return [self._directed(corners[k], corners[(k + 1) % 3]) for k in range(3)]
 
     def _directed(self, a: int, b: int) -> dict[int, int]:
         links = self._links[(min(a, b), max(a, b))]

@@ -23,6 +23,9 @@ Bool = NDArray[np.bool_]
 DIVIDES_ABOVE = 0.05
 """Weight from which a path divides; below, it goes one way by chance with all of its weight."""
 
+OFFSET = 0.3719
+"""Of a period: by how much lines are moved along y, so that none lies on the border of the period."""
+
 ARC_LINES = 48
 MAXIMUM_STEPS = 4000
 OLD = 60
@@ -253,11 +256,16 @@ def _straight(line: Line) -> Iterator[Line]:
 
 def _copies(line: Line, period: float) -> Iterator[Line]:
     """The line where it and its repetitions lie within 0 <= y <= period."""
+    line = _shifted(line, OFFSET * period)
     low, high = sorted((line.a[0], line.b[0]))
     for k in range(int(np.floor(-high / period)), int(np.ceil(1 - low / period)) + 1):
         if low + k * period <= period and high + k * period >= 0:
-            a, b = ((y + k * period, z) for y, z in (line.a, line.b))
-            yield dataclasses.replace(line, a=a, b=b)
+            yield _shifted(line, k * period)
+
+
+def _shifted(line: Line, by: float) -> Line:
+    a, b = ((y + by, z) for y, z in (line.a, line.b))
+    return dataclasses.replace(line, a=a, b=b)
 
 
 def _perpendicular(directions: Float64) -> Float64:
@@ -272,4 +280,4 @@ def _fresnel(n1: Float64, n2: Float64, cosine: Float64) -> tuple[Complex128, Com
     inner = np.sqrt((1 - (n1 / n2) ** 2 * (1 - cosine**2)).astype(np.complex128))
     rs = (n1 * cosine - n2 * inner) / (n1 * cosine + n2 * inner)
     rp = (n2 * cosine - n1 * inner) / (n2 * cosine + n1 * inner)
-    return rs, rp, inner.real.astype(np.float64)
+    return rs.astype(np.complex128), rp.astype(np.complex128), inner.real.astype(np.float64)
