@@ -1,4 +1,4 @@
-"""Planted faults of convention: each is caught by where a real prism, which looks different from everywhere, sends light.
+"""Planted faults of convention: each is caught by where a real prism, different from every side, sends light.
 
 Four switches make sixteen readings of one file: front and back exchanged, rows and columns exchanged, azimuth mirrored,
 azimuth turned by 180 degrees. One of them is right, and one is right too: light turned round takes the same way.
@@ -23,7 +23,7 @@ from transom.products.goniophotometer import directions_in
 from transom.products.section import Section
 
 INDEX, FACET_DEG, TURN_DEG = 1.49, 45.0, 35.0
-"""The prism: facets of 45 and 70 degrees, turned by 35 degrees about the normal: no mirror image of itself in x or y."""
+"""The prism: facets of 45 and 70 degrees, turned by 35 degrees about the normal, so that no mirror shows it itself."""
 
 MOVED_BY_A_FAULT = 0.5
 MOVED_BY_SAMPLING = 0.3
