@@ -1,34 +1,14 @@
 #include "transom/ray_scene.h"
 
-#if TRANSOM_EMBREE_MAJOR >= 4
-#include <embree4/rtcore.h>
-#else
-#include <embree3/rtcore.h>
-#endif
-
 #include <algorithm>
-#include <string>
 
+#include "embree_device.h"
 #include "transom/error.h"
 
 namespace transom {
 namespace {
 
 constexpr std::size_t kWidth = 16;
-
-void report_error(void*, RTCError code, const char* text) {
-  throw std::runtime_error("Embree error " + std::to_string(static_cast<int>(code)) + ": " + (text ? text : ""));
-}
-
-RTCDevice shared_device() {
-  static const RTCDevice device = [] {
-    RTCDevice made = rtcNewDevice(nullptr);
-    if (!made) throw std::runtime_error("Embree cannot start: rtcNewDevice failed");
-    rtcSetDeviceErrorFunction(made, report_error, nullptr);
-    return made;
-  }();
-  return device;
-}
 
 // Embree 3 takes a context, Embree 4 optional arguments.
 #if TRANSOM_EMBREE_MAJOR >= 4

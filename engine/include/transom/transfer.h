@@ -20,6 +20,10 @@ struct SparseRows {
     entries.insert(entries.end(), row.begin(), row.end());
     begin.push_back(entries.size());
   }
+  std::vector<Share> row(std::size_t i) const {
+    return {entries.begin() + static_cast<std::ptrdiff_t>(begin[i]),
+            entries.begin() + static_cast<std::ptrdiff_t>(begin[i + 1])};
+  }
   /// Sum over a row of weight x values[index].
   template <typename Value>
   Value dot(std::size_t row, const std::vector<Value>& values) const {

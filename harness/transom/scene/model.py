@@ -165,7 +165,11 @@ class ConditionSpec:
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything that a scene folder says. The first view and the first condition are the defaults."""
+    """Everything that a scene folder says. The first view and the first condition are the defaults.
+
+    A variant (transom.fenestration.reglazing) has other glazing than its folder says: variant_of is then the folder's
+    name, and glazings say what was replaced, as on the command line.
+    """
 
     name: str
     file: Path
@@ -181,3 +185,5 @@ class Scene:
     regions: tuple[Region, ...]
     sensors: tuple[SensorSet, ...]
     tags: tuple[str, ...] = field(default=())
+    variant_of: str = ""
+    glazings: tuple[str, ...] = ()
