@@ -54,4 +54,4 @@ def load_fenestration(choice: ProductChoice) -> Fenestration:
     if is_file(choice.name):
         return TabulatedFenestration(read_bsdf(FilePath(choice.name)))
     product = load_product(choice.name).with_parameters(dict(choice.parameters))
-    return TracedFenestration(product.section())
+    return TracedFenestration(product.tracer())

@@ -132,10 +132,13 @@ class Section:
 
     def sweep(self, directions: Float64, rays: int = 16, seed: int = 1) -> Sweep:
         """Sends light along each of `directions` (N, 3) through the product: many directions, few rays each."""
-        exits, incidence, sent, back = _engine.trace_section_sweep(
-            self._core, np.ascontiguousarray(directions, np.float64), rays, seed
-        )
-        return Sweep(Exits(exits[:, :3], exits[:, 3]), incidence.astype(np.int64), sent, back)
+        return swept(_engine.sweep_section(self._core, np.ascontiguousarray(directions, np.float64), rays, seed))
+
+
+def swept(found: tuple[Float64, NDArray[np.uint32], Float64, Float64]) -> Sweep:
+    """What the engine's sweeps give, by name."""
+    exits, incidence, sent, back = found
+    return Sweep(Exits(exits[:, :3], exits[:, 3]), incidence.astype(np.int64), sent, back)
 
 
 def polyline(points: Sequence[Point], **side: object) -> list[Line]:
