@@ -52,7 +52,7 @@ def lopsided_matrix(transmittance: float = 0.6, seed: int = 3) -> Float64:
 
 def product_room(product: MadeUpProduct, monkeypatch: pytest.MonkeyPatch) -> Scene:
     """reference_rooms.window_room with the product in its window, whatever the scene's file says."""
-    for module in ("transom.fenestration.light", "transom_reference.panels"):
+    for module in ("transom.fenestration.light", "transom_reference.panels", "transom_reference.mitsuba_scene"):
         monkeypatch.setattr(f"{module}.load_fenestration", lambda _choice: product)
     scene = window_room("none")
     choice = ProductChoice("made_up", (), "0" * 64)
