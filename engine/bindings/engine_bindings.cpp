@@ -43,12 +43,17 @@ nb::ndarray<nb::numpy, float> picture(std::vector<glm::vec3>&& pixels, int width
   return to_array<float>(std::move(pixels), {static_cast<std::size_t>(height), static_cast<std::size_t>(width), 3});
 }
 
-// The engine with the renderer that looks at it.
+// The engine with its present light, the renderer that looks at it, and the sensors that were asked last.
 struct Session {
   Engine engine;
   FrameRenderer renderer;
+  std::shared_ptr<const Lighting> present = std::make_shared<const Lighting>();
+  std::shared_ptr<Lighting> in_steps;
+  Sensors sensors;
+  const Lighting* previous() const { return present->shooting.unshot.empty() ? nullptr : present.get(); }
   Session(SceneGeometry scene, const SkyBins& bins, SolveOptions options)
       : engine(std::move(scene), bins, options), renderer(engine) {}
+  Session(const Session& solved, SceneGeometry scene) : engine(solved.engine, std::move(scene)), renderer(engine) {}
 };
 
 // At most so many threads while a `with` block lasts.
@@ -170,7 +175,9 @@ NB_MODULE(_engine, m) {
       .def_ro("leak_share", &SolveFacts::leak_share)
       .def_ro("defects", &SolveFacts::defects)
       .def_ro("cluster_count", &SolveFacts::cluster_count)
-      .def_ro("link_bytes", &SolveFacts::link_bytes);
+      .def_ro("link_bytes", &SolveFacts::link_bytes)
+      .def_ro("kept_patch_rows", &SolveFacts::kept_patch_rows)
+      .def_ro("kept_node_rows", &SolveFacts::kept_node_rows);
 
   nb::class_<Condition>(m, "Condition")
       .def(
@@ -224,23 +231,30 @@ NB_MODULE(_engine, m) {
   nb::class_<Session>(m, "Engine")
       .def(nb::init<SceneGeometry, const SkyBins&, SolveOptions>(), "scene"_a, "sky_bins"_a, "options"_a,
            nb::call_guard<nb::gil_scoped_release>(), "Solves the scene: everything that depends on geometry alone.")
+      .def(nb::init<const Session&, SceneGeometry>(), "solved"_a, "scene"_a, nb::call_guard<nb::gil_scoped_release>(),
+           "Solves an edited scene, and takes over what is still valid: equal to solving it afresh.")
       .def_prop_ro("facts", [](const Session& s) { return s.engine.facts(); })
       .def(
-          "relight", [](Session& s, const Condition& c) { s.engine.relight(c); }, "condition"_a,
-          nb::call_guard<nb::gil_scoped_release>())
+          "relight", [](Session& s, const Condition& c) { s.present = s.engine.relight(c, s.previous()); },
+          "condition"_a, nb::call_guard<nb::gil_scoped_release>())
       .def(
-          "begin_relight", [](Session& s, const Condition& c) { s.engine.begin_relight(c); }, "condition"_a,
-          nb::call_guard<nb::gil_scoped_release>(), "Classic method: direct light at once, indirect light to follow.")
+          "begin_relight",
+          [](Session& s, const Condition& c) {
+            s.in_steps = std::make_shared<Lighting>(s.engine.begin_relight(c, s.previous()));
+            s.present = s.in_steps;
+          },
+          "condition"_a, nb::call_guard<nb::gil_scoped_release>(),
+          "Classic method: direct light at once, indirect light to follow.")
       .def(
-          "continue_relight", [](Session& s, int shots) { return s.engine.continue_relight(shots); }, "shots"_a,
-          nb::call_guard<nb::gil_scoped_release>(), "Shoots at most so often; whether more is to come.")
+          "continue_relight", [](Session& s, int shots) { return s.engine.continue_relight(*s.in_steps, shots); },
+          "shots"_a, nb::call_guard<nb::gil_scoped_release>(), "Shoots at most so often; whether more is to come.")
       .def(
           "render",
           [](Session& s, const View& view, Visibility visibility, int edge_samples, bool components) {
             Frame frame;
             {
               const nb::gil_scoped_release release;
-              frame = s.renderer.render(view, {visibility, edge_samples, components});
+              frame = s.renderer.render(view, *s.present, {visibility, edge_samples, components});
             }
             nb::dict result;
             const int w = frame.width, h = frame.height;
@@ -262,7 +276,10 @@ NB_MODULE(_engine, m) {
             std::vector<Irradiance> e;
             {
               const nb::gil_scoped_release release;
-              e = s.engine.illuminance(to_vector<glm::dvec3>(points), to_vector<glm::vec3>(normals), samples);
+              const std::vector<glm::dvec3> places = to_vector<glm::dvec3>(points);
+              const std::vector<glm::vec3> up = to_vector<glm::vec3>(normals);
+              if (!s.sensors.are(places, up, samples)) s.sensors = s.engine.sensors(places, up, samples);
+              e = s.engine.illuminance(*s.present, s.sensors);
             }
             const std::size_t n = e.size();
             return to_array<float>(std::move(e), {n, 3, 3});
@@ -271,7 +288,7 @@ NB_MODULE(_engine, m) {
       .def(
           "audit",
           [](const Session& s, int rays_per_opening) {
-            const EnergyAudit a = s.engine.audit(rays_per_opening);
+            const EnergyAudit a = s.engine.audit(*s.present, rays_per_opening);
             nb::dict result;
             const auto put = [&](const char* name, glm::dvec3 v) { result[name] = nb::make_tuple(v.x, v.y, v.z); };
             put("in_sky", a.in_sky);
@@ -308,10 +325,10 @@ NB_MODULE(_engine, m) {
             return to_array<float>(std::move(areas), {n});
           },
           nb::rv_policy::move, "Exposed area of each patch [m²].")
-      .def_prop_ro("sweeps", [](const Session& s) { return s.engine.lighting().sweeps; })
-      .def_prop_ro("shots", [](const Session& s) { return s.engine.lighting().shots; })
-      .def_prop_ro("unshot_share", [](const Session& s) { return s.engine.lighting().unshot_share; })
-      .def_prop_ro("forward_rays", [](const Session& s) { return s.engine.lighting().forward_ray_count; })
+      .def_prop_ro("sweeps", [](const Session& s) { return s.present->sweeps; })
+      .def_prop_ro("shots", [](const Session& s) { return s.present->shots; })
+      .def_prop_ro("unshot_share", [](const Session& s) { return s.present->unshot_share; })
+      .def_prop_ro("forward_rays", [](const Session& s) { return s.present->forward_ray_count; })
       .def_prop_ro("trace",
                    [](Session& s) {
                      nb::list events;

@@ -14,15 +14,15 @@ constexpr std::uint32_t kAuditSeed = 0x5eed0a0d;
 
 // Flux in is sampled here from the openings outwards, with rays of its own: nothing of the solve is used but the
 // radiosity of outdoor surfaces.
-EnergyAudit Engine::audit(int rays_per_opening) const {
+EnergyAudit Engine::audit(const Lighting& lighting, int rays_per_opening) const {
   EnergyAudit audit;
-  const Condition& condition = lighting_.condition;
+  const Condition& condition = lighting.condition;
   const int ground = sky_index_->count() - 1, per_slot = mesh_->elements_per_slot();
-  const std::vector<glm::vec3> element_light = element_direct();
+  const std::vector<glm::vec3> element_light = element_direct(lighting);
   const auto element_radiosity = [&](int element) {
     const int patch = patch_of_slot_[element / per_slot];
     if (patch < 0) return glm::vec3(0);
-    return lighting_.patch_smooth_radiosity[patch] + (connects_emitters_ ? patch_emitted_[patch] : glm::vec3(0)) +
+    return lighting.patch_smooth_radiosity[patch] + (connects_emitters_ ? patch_emitted_[patch] : glm::vec3(0)) +
            patch_reflectance_[patch] * element_light[patch * per_slot + element % per_slot];
   };
   std::vector<Ray> rays(static_cast<std::size_t>(rays_per_opening));
@@ -72,7 +72,7 @@ EnergyAudit Engine::audit(int rays_per_opening) const {
   for (const PointSource& source : scene_.point_sources) audit.in_emitted += glm::dvec3(4 * kPi * source.intensity);
   for (std::size_t p = 0; p < slot_of_patch_.size(); ++p) {
     if (!is_interior_[p]) continue;
-    const glm::dvec3 lost(patch_area_[p] * (1.f - patch_reflectance_[p]) * lighting_.patch_irradiance[p]);
+    const glm::dvec3 lost(patch_area_[p] * (1.f - patch_reflectance_[p]) * lighting.patch_irradiance[p]);
     const Slot slot = mesh_->slot(slot_of_patch_[p]);
     (scene_.materials[faces_.faces[slot.face].material].opening >= 0 ? audit.out : audit.absorbed) += lost;
     audit.in_emitted += glm::dvec3(patch_area_[p] * patch_emitted_[p]);

@@ -186,11 +186,9 @@ ForwardLight ForwardRays::cast(const Condition& condition, const SkyBinIndex& sk
 
 ProgressiveRadiosity::ProgressiveRadiosity(const SparseRows& form_factors, const SparseRows& through,
                                            std::vector<float> area, std::vector<glm::vec3> reflectance,
-                                           const std::vector<glm::vec3>& emitted)
-    : area_(std::move(area)), reflectance_(std::move(reflectance)), emitted_(emitted), unshot_(emitted) {
+                                           std::vector<glm::vec3> emitted)
+    : area_(std::move(area)), reflectance_(std::move(reflectance)), emitted_(std::move(emitted)) {
   const std::size_t n = area_.size();
-  direct_.assign(n, glm::vec3(0));
-  irradiance_.assign(n, glm::vec3(0));
   std::vector<std::vector<Share>> columns(n);
   for (const SparseRows* rows : {&form_factors, &through})
     for (std::size_t p = 0; p < n; ++p)
@@ -203,57 +201,62 @@ ProgressiveRadiosity::ProgressiveRadiosity(const SparseRows& form_factors, const
   }
 }
 
-void ProgressiveRadiosity::replace_direct(const std::vector<glm::vec3>& direct) {
-  for (std::size_t p = 0; p < area_.size(); ++p) {
-    const glm::vec3 change = direct[p] - direct_[p];
-    irradiance_[p] += change;
-    unshot_[p] += reflectance_[p] * change;
-  }
-  direct_ = direct;
+ShootingState ProgressiveRadiosity::dark() const {
+  const std::vector<glm::vec3> nothing(area_.size(), glm::vec3(0));
+  return {nothing, nothing, emitted_};
 }
 
-int ProgressiveRadiosity::shoot(int shots, double tolerance) {
+void ProgressiveRadiosity::replace_direct(ShootingState& state, const std::vector<glm::vec3>& direct) const {
+  for (std::size_t p = 0; p < area_.size(); ++p) {
+    const glm::vec3 change = direct[p] - state.direct[p];
+    state.irradiance[p] += change;
+    state.unshot[p] += reflectance_[p] * change;
+  }
+  state.direct = direct;
+}
+
+int ProgressiveRadiosity::shoot(ShootingState& state, int shots, double tolerance) const {
   if (area_.empty()) return 0;
   double in_flight = 0;
-  for (std::size_t p = 0; p < area_.size(); ++p) in_flight += area_[p] * channel_sum(unshot_[p]);
-  const double enough = tolerance * flux_leaving();
+  for (std::size_t p = 0; p < area_.size(); ++p) in_flight += area_[p] * channel_sum(state.unshot[p]);
+  const double enough = tolerance * flux_leaving(state);
   int shot = 0;
   for (; shot < shots && in_flight > enough; ++shot) {
     std::size_t brightest = 0;
     float most = -1;
     for (std::size_t p = 0; p < area_.size(); ++p) {
-      const float flux = area_[p] * channel_sum(unshot_[p]);
+      const float flux = area_[p] * channel_sum(state.unshot[p]);
       if (flux > most) {
         most = flux;
         brightest = p;
       }
     }
-    const glm::vec3 given = unshot_[brightest];
-    unshot_[brightest] = glm::vec3(0);
+    const glm::vec3 given = state.unshot[brightest];
+    state.unshot[brightest] = glm::vec3(0);
     in_flight -= static_cast<double>(most);
     for (std::size_t k = seen_by_.begin[brightest]; k < seen_by_.begin[brightest + 1]; ++k) {
       const std::size_t p = static_cast<std::size_t>(seen_by_.entries[k].index);
       const glm::vec3 received = seen_by_.entries[k].weight * given;
-      irradiance_[p] += received;
-      const float before = channel_sum(unshot_[p]);
-      unshot_[p] += reflectance_[p] * received;
-      in_flight += static_cast<double>(area_[p] * (channel_sum(unshot_[p]) - before));
+      state.irradiance[p] += received;
+      const float before = channel_sum(state.unshot[p]);
+      state.unshot[p] += reflectance_[p] * received;
+      in_flight += static_cast<double>(area_[p] * (channel_sum(state.unshot[p]) - before));
     }
   }
   return shot;
 }
 
-double ProgressiveRadiosity::flux_leaving() const {
+double ProgressiveRadiosity::flux_leaving(const ShootingState& state) const {
   double sum = 0;
   for (std::size_t p = 0; p < area_.size(); ++p)
-    sum += area_[p] * channel_sum(emitted_[p] + reflectance_[p] * irradiance_[p]);
+    sum += area_[p] * channel_sum(emitted_[p] + reflectance_[p] * state.irradiance[p]);
   return sum;
 }
 
-double ProgressiveRadiosity::unshot_share() const {
+double ProgressiveRadiosity::unshot_share(const ShootingState& state) const {
   double in_flight = 0;
-  for (std::size_t p = 0; p < area_.size(); ++p) in_flight += area_[p] * channel_sum(unshot_[p]);
-  const double all = flux_leaving();
+  for (std::size_t p = 0; p < area_.size(); ++p) in_flight += area_[p] * channel_sum(state.unshot[p]);
+  const double all = flux_leaving(state);
   return all > 0 ? in_flight / all : 0;
 }
 

@@ -15,70 +15,71 @@ void Engine::solve_classic() {
   forward_rays_ = std::make_unique<ForwardRays>(*mesh_, *rays_, scene_.materials, scene_.openings, ForwardRayCounts{},
                                                 hash_seed(options_.seed, kForwardStream));
   shooting_ =
-      std::make_unique<ProgressiveRadiosity>(form_factors_, through_, patch_area_, patch_reflectance_, patch_emitted_);
+      std::make_unique<ProgressiveRadiosity>(*form_factors_, through_, patch_area_, patch_reflectance_, patch_emitted_);
   connects_emitters_ = false;
 }
 
-void Engine::begin_relight(Condition condition) {
+Lighting Engine::begin_relight(Condition condition, const Lighting* previous) const {
   if (options_.method != Method::kClassic) throw InputError("only the classic method relights step by step");
   condition.validate(sky_index_->count() - 1);
-  lighting_.condition = std::move(condition);
-  lighting_.shots = 0;
+  Lighting lighting;
+  lighting.condition = std::move(condition);
   const std::size_t n = slot_of_patch_.size();
   const int per_slot = mesh_->elements_per_slot();
   {
     const TracePhase phase(trace_, "forward rays");
-    ForwardLight light = forward_rays_->cast(lighting_.condition, *sky_index_, patch_of_slot_, patch_area_);
-    lighting_.patch_sun = std::move(light.sun);
-    lighting_.patch_sky = std::move(light.sky);
-    lighting_.forward_ray_count = light.ray_count;
+    ForwardLight light = forward_rays_->cast(lighting.condition, *sky_index_, patch_of_slot_, patch_area_);
+    lighting.patch_sun = std::move(light.sun);
+    lighting.patch_sky = std::move(light.sky);
+    lighting.forward_ray_count = light.ray_count;
     // What lies outdoors is lit without an opening; point sources light everything.
     std::vector<int> outdoors;
     for (std::size_t p = 0; p < n; ++p)
       if (!is_interior_[p]) {
         outdoors.push_back(slot_of_patch_[p]);
-        lighting_.patch_sky[p] = sky_light(patch_sky_, p);
+        lighting.patch_sky[p] = sky_light(lighting.condition, patch_sky_, p);
       }
-    const std::vector<Beam>& beams = lighting_.condition.beams;
-    std::vector<LitElement> lit = direct_light_->deposit(beams, outdoors, hash_seed(options_.seed, kForwardStream));
+    const std::vector<Beam>& beams = lighting.condition.beams;
+    std::vector<LitElement> lit =
+        direct_light_->deposit(beams, direct_light_->receivers(outdoors, {}), hash_seed(options_.seed, kForwardStream));
     if (!scene_.point_sources.empty()) {
       std::vector<int> indoors;
       for (std::size_t p = 0; p < n; ++p)
         if (is_interior_[p]) indoors.push_back(slot_of_patch_[p]);
       const std::vector<LitElement> more =
-          direct_light_->deposit({}, indoors, hash_seed(options_.seed, kForwardStream));
+          direct_light_->deposit({}, direct_light_->receivers(indoors, {}), hash_seed(options_.seed, kForwardStream));
       lit.insert(lit.end(), more.begin(), more.end());
     }
     for (const LitElement& e : lit) {
       const int patch = patch_of_slot_[e.element / per_slot];
-      const Slot slot = mesh_->slot(e.element / per_slot);
-      lighting_.patch_sun[patch] +=
-          e.illuminance * (mesh_->element_area(slot.face, slot.cell, e.element % per_slot) / patch_area_[patch]);
+      lighting.patch_sun[patch] += e.illuminance * element_share_[patch * per_slot + e.element % per_slot];
     }
   }
   std::vector<glm::vec3> direct(n);
-  for (std::size_t p = 0; p < n; ++p) direct[p] = lighting_.patch_sun[p] + lighting_.patch_sky[p];
-  shooting_->replace_direct(direct);
-  show_classic();
+  for (std::size_t p = 0; p < n; ++p) direct[p] = lighting.patch_sun[p] + lighting.patch_sky[p];
+  lighting.shooting = previous ? previous->shooting : shooting_->dark();
+  shooting_->replace_direct(lighting.shooting, direct);
+  show_classic(lighting);
+  return lighting;
 }
 
-bool Engine::continue_relight(int shots) {
+bool Engine::continue_relight(Lighting& lighting, int shots) const {
   if (options_.method != Method::kClassic) throw InputError("only the classic method relights step by step");
   const TracePhase phase(trace_, "shooting");
-  const int shot = shooting_->shoot(shots, kShootingTolerance);
-  lighting_.shots += shot;
-  show_classic();
+  const int shot = shooting_->shoot(lighting.shooting, shots, kShootingTolerance);
+  lighting.shots += shot;
+  show_classic(lighting);
   return shot == shots;
 }
 
 // Hands the present state to all that shows or measures light.
-void Engine::show_classic() {
+void Engine::show_classic(Lighting& lighting) const {
   const std::size_t n = slot_of_patch_.size();
-  lighting_.unshot_share = shooting_->unshot_share();
-  lighting_.patch_irradiance = shooting_->irradiance();
-  lighting_.patch_smooth_radiosity.resize(n);
+  lighting.unshot_share = shooting_->unshot_share(lighting.shooting);
+  lighting.patch_irradiance = lighting.shooting.irradiance;
+  lighting.patch_smooth_radiosity.resize(n);
   for (std::size_t p = 0; p < n; ++p)
-    lighting_.patch_smooth_radiosity[p] = patch_emitted_[p] + patch_reflectance_[p] * lighting_.patch_irradiance[p];
+    lighting.patch_smooth_radiosity[p] = patch_emitted_[p] + patch_reflectance_[p] * lighting.patch_irradiance[p];
 }
 
 }  // namespace transom

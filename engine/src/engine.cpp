@@ -1,9 +1,11 @@
 #include "transom/engine.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <unordered_map>
 
 #include "streams.h"
 #include "transom/overlap.h"
@@ -23,20 +25,31 @@ constexpr float kExposedNode = 0.5f;       // a node counts when at least this s
 }  // namespace
 
 Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions options)
-    : scene_(std::move(scene)), options_(options) {
+    : scene_(std::move(scene)), sky_bins_(sky_bins), options_(options) {
+  solve(nullptr);
+}
+
+Engine::Engine(const Engine& solved, SceneGeometry scene)
+    : scene_(std::move(scene)), sky_bins_(solved.sky_bins_), options_(solved.options_) {
+  options_.maximum_edge_m = solved.facts_.maximum_edge_m;
+  solve(&solved);
+}
+
+void Engine::solve(const Engine* solved) {
   trace_.enable(options_.trace);
   {
     const TracePhase phase(trace_, "geometry");
     faces_ = make_faces(scene_);
     rays_ = std::make_unique<RayScene>(faces_, scene_.materials, scene_.openings);
-    sky_index_ = std::make_unique<SkyBinIndex>(sky_bins);
+    sky_index_ = std::make_unique<SkyBinIndex>(sky_bins_);
     const std::vector<char> is_indoors =
         survey_interior(scene_, *rays_, faces_, hash_seed(options_.seed, kSurveyStream));
     check_overlaps(faces_, is_indoors, *rays_);
-    const std::vector<float> edges =
-        choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
-    facts_.maximum_edge_m = *std::min_element(edges.begin(), edges.end());
-    mesh_ = std::make_unique<LightMesh>(faces_, edges, options_.elements_per_edge);
+    edges_ = solved && are_same_places(faces_, solved->faces_)
+                 ? solved->edges_
+                 : choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
+    facts_.maximum_edge_m = *std::min_element(edges_.begin(), edges_.end());
+    mesh_ = std::make_unique<LightMesh>(faces_, edges_, options_.elements_per_edge);
     gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_);
     const float element_edge = facts_.maximum_edge_m / static_cast<float>(options_.elements_per_edge);
     direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources, scene_.materials,
@@ -44,21 +57,19 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
     beam_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, std::vector<PointSource>{}, scene_.materials,
                                                 element_edge * element_edge);
   }
-  std::vector<GatherRow> rows;
-  std::vector<int> divisions;
+  Known known = known_from(solved);
   {
     const TracePhase phase(trace_, "patches");
     patch_of_slot_.assign(static_cast<std::size_t>(mesh_->slot_count()), -1);
-    find_patches(first_wave(), rows);
-    mark_interior(rows);
-    find_unseen_patches(rows);
-    check_closed(rows);
+    find_patches(first_wave(), known);
+    mark_interior();
+    find_unseen_patches(known);
+    check_closed();
+    known.has_same_patches = known.has_surroundings && slot_of_patch_ == solved->slot_of_patch_;
   }
   {
     const TracePhase phase(trace_, "transfer");
-    divisions = cell_divisions(rows);
-    assemble_transfer(rows);
-    rows.clear();
+    assemble_transfer(known);
   }
   if (options_.method == Method::kClassic) {
     const TracePhase phase(trace_, "forward rays");
@@ -66,16 +77,30 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
   } else {
     {
       const TracePhase phase(trace_, "nodes");
-      gather_nodes(divisions);
+      gather_nodes(known);
     }
     const TracePhase phase(trace_, "links");
     light_always();
-    links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes());
-    links_->prepare(beam_slots());
-    facts_.link_bytes = links_->byte_count();
+    link_nodes(known);
   }
   facts_.face_count = static_cast<int>(faces_.faces.size());
   facts_.patch_count = static_cast<int>(slot_of_patch_.size());
+}
+
+Engine::Known Engine::known_from(const Engine* solved) const {
+  Known known;
+  known.engine = solved;
+  if (!solved) return known;
+  known.has_surroundings = are_same_places(faces_, solved->faces_) && mesh_->has_same_cells(*solved->mesh_);
+  known.has_openings = known.has_surroundings;
+  for (std::size_t f = 0; f < faces_.faces.size() && known.has_openings; ++f) {
+    const int own = scene_.materials[faces_.faces[f].material].opening,
+              other = solved->scene_.materials[solved->faces_.faces[f].material].opening;
+    known.has_openings =
+        own < 0 ? other < 0
+                : other >= 0 && scene_.openings[own].transmittance == solved->scene_.openings[other].transmittance;
+  }
+  return known;
 }
 
 Engine::~Engine() = default;
@@ -86,40 +111,62 @@ glm::vec3 Engine::reflectance(int face, Side side) const {
   return side == 1 ? glm::vec3(scene_.openings[material.opening].diffuse_reflectance) : glm::vec3(0);
 }
 
-std::vector<Share> Engine::to_patches(const std::vector<Share>& elements) const {
+std::vector<Share> Engine::to_slots(std::vector<Share> elements) const {
+  for (Share& share : elements) share.index /= mesh_->elements_per_slot();
+  merge_shares(elements);
+  return elements;
+}
+
+std::vector<Share> Engine::patches_at(const std::vector<Share>& slots) const {
   std::vector<Share> patches;
-  patches.reserve(elements.size());
-  for (const Share& share : elements) {
-    const int patch = patch_of_slot_[share.index / mesh_->elements_per_slot()];
-    if (patch >= 0) patches.push_back({patch, share.weight});
-  }
+  patches.reserve(slots.size());
+  for (const Share& share : slots)
+    if (patch_of_slot_[share.index] >= 0) patches.push_back({patch_of_slot_[share.index], share.weight});
   merge_shares(patches);
   return patches;
 }
 
-void Engine::assemble_transfer(std::vector<GatherRow>& rows) {
-  const std::size_t n = rows.size();
+std::vector<Share> Engine::to_patches(const std::vector<Share>& elements) const {
+  return patches_at(to_slots(elements));
+}
+
+void Engine::assemble_transfer(const Known& known) {
+  const std::size_t n = patch_rows_.size();
   patch_area_.resize(n);
   patch_reflectance_.resize(n);
   patch_emitted_.resize(n);
   std::vector<float> row_sums(n);
+  std::vector<char> is_behind_openings(n);
   for (std::size_t p = 0; p < n; ++p) {
+    const PatchRow& row = patch_rows_[p];
     const Slot slot = mesh_->slot(slot_of_patch_[p]);
-    patch_area_[p] = std::max(1e-6f, rows[p].exposure) * mesh_->cell_area(slot.face, slot.cell);
+    patch_area_[p] = std::max(1e-6f, row.around->exposure) * mesh_->cell_area(slot.face, slot.cell);
+    for (int e = 0; e < mesh_->elements_per_slot(); ++e)
+      element_share_.push_back(mesh_->element_area(slot.face, slot.cell, e) / patch_area_[p]);
     patch_reflectance_[p] = reflectance(slot.face, slot.side);
     patch_emitted_[p] = kPi * scene_.materials[faces_.faces[slot.face].material].luminance;
-    row_sums[p] = is_interior_[p] ? 1.f : 1.f - rows[p].escaped;
-    form_factors_.append(to_patches(rows[p].reached));
-    through_.append(to_patches(rows[p].through));
-    patch_sky_.append(rows[p].sky);
+    row_sums[p] = is_interior_[p] ? 1.f : 1.f - row.around->escaped;
+    is_behind_openings[p] = is_interior_[p] && row.around->escaped == 0;
+    through_.append(patches_at(row.beyond->through));
+    facts_.kept_patch_rows += known.has_surroundings && known.engine->patch_of_slot_[slot_of_patch_[p]] >= 0;
+    patch_sky_.append(row.beyond->sky);
   }
+  receivers_ = beam_light_->receivers(slot_of_patch_, std::move(is_behind_openings));
   double emitting = 0, interior = 0;
   for (std::size_t p = 0; p < n; ++p) {
     if (is_interior_[p]) interior += patch_area_[p];
     if (is_interior_[p] && patch_emitted_[p] != glm::vec3(0)) emitting += patch_area_[p];
   }
   connects_emitters_ = emitting < kConnectedShare * interior;
-  facts_.defects = make_reciprocal(form_factors_, patch_area_, row_sums);
+  if (known.has_same_patches && is_interior_ == known.engine->is_interior_) {
+    form_factors_ = known.engine->form_factors_;
+    facts_.defects = known.engine->facts_.defects;
+  } else {
+    SparseRows sampled;
+    for (const PatchRow& row : patch_rows_) sampled.append(patches_at(row.around->reached));
+    facts_.defects = make_reciprocal(sampled, patch_area_, row_sums);
+    form_factors_ = std::make_shared<const SparseRows>(std::move(sampled));
+  }
   std::vector<PatchPlace> places(n);
   for (std::size_t p = 0; p < n; ++p) {
     const Slot slot = mesh_->slot(slot_of_patch_[p]);
@@ -128,48 +175,137 @@ void Engine::assemble_transfer(std::vector<GatherRow>& rows) {
                  slot.side == 0 ? face.normal : -face.normal};
   }
   interreflection_ =
-      std::make_unique<Interreflection>(form_factors_, through_, patch_reflectance_, patch_area_, places);
+      std::make_unique<Interreflection>(*form_factors_, through_, patch_reflectance_, patch_area_, places);
   facts_.cluster_count = interreflection_->cluster_count();
 }
 
 // Cells are divided where the harmonic mean distance of what they see is short against their size: there irradiance
 // changes within the cell [after Ward & Heckbert 1992].
-std::vector<int> Engine::cell_divisions(const std::vector<GatherRow>& rows) const {
+std::vector<int> Engine::cell_divisions() const {
   std::vector<int> divisions;
-  for (std::size_t p = 0; p < rows.size(); ++p) {
+  for (std::size_t p = 0; p < patch_rows_.size(); ++p) {
     const Slot slot = mesh_->slot(slot_of_patch_[p]);
     const float size = std::sqrt(mesh_->cell_area(slot.face, slot.cell));
-    const float wanted = size / (options_.node_spacing * std::max(rows[p].harmonic_distance, 1e-6f * faces_.extent));
+    const float distance = std::max(patch_rows_[p].around->harmonic_distance, 1e-6f * faces_.extent);
+    const float wanted = size / (options_.node_spacing * distance);
     const bool is_small = size < kLeastDividedSize * facts_.maximum_edge_m;
     divisions.push_back(is_small ? 1 : wanted > 2 ? 4 : wanted > 1 ? 2 : 1);
   }
   return divisions;
 }
 
-void Engine::gather_nodes(const std::vector<int>& divisions) {
-  std::vector<int> slots, slot_divisions;
+// Nodes in the order of slots, so that it does not depend on the way in which patches are found.
+void Engine::gather_nodes(Known& known) {
+  const std::vector<int> divisions = cell_divisions();
+  std::vector<std::pair<int, int>> cells;  // slot, divisions
   for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)
-    if (patch_reflectance_[p] != glm::vec3(0)) {
-      slots.push_back(slot_of_patch_[p]);
-      slot_divisions.push_back(divisions[p]);
-    }
+    if (patch_reflectance_[p] != glm::vec3(0)) cells.push_back({slot_of_patch_[p], divisions[p]});
+  std::sort(cells.begin(), cells.end());
+  std::vector<int> slots, slot_divisions;
+  for (const auto& [slot, division] : cells) {
+    slots.push_back(slot);
+    slot_divisions.push_back(division);
+  }
   nodes_ = std::make_unique<NodeField>(*mesh_, *rays_, slots, slot_divisions);
+  facts_.node_count = static_cast<int>(nodes_->nodes().size());
+  find_known_nodes(known);
+  facts_.kept_node_rows =
+      static_cast<int>(std::count_if(known.node.begin(), known.node.end(), [](int node) { return node >= 0; }));
+  const bool is_the_same = known.has_same_nodes && known.has_same_patches;
+  node_rows_ = is_the_same ? known.engine->node_rows_ : node_rows(known);
+  if (is_the_same && known.has_openings) {
+    node_sky_ = known.engine->node_sky_;
+    node_through_ = known.engine->node_through_;
+  } else {
+    look_out_of_nodes(known);
+  }
+  std::vector<char> is_exposed;
+  for (const float exposure : node_rows_->exposure) is_exposed.push_back(exposure >= kExposedNode);
+  nodes_->finish(std::move(is_exposed));
+}
+
+// Which nodes the other engine had, if it had all patches of this one: else it left out what they are seen by.
+void Engine::find_known_nodes(Known& known) const {
   const std::vector<Node>& nodes = nodes_->nodes();
-  facts_.node_count = static_cast<int>(nodes.size());
+  known.node.assign(nodes.size(), -1);
+  if (!known.has_surroundings || !known.engine->nodes_ ||
+      !std::all_of(slot_of_patch_.begin(), slot_of_patch_.end(),
+                   [&](int slot) { return known.engine->patch_of_slot_[slot] >= 0; }))
+    return;
+  const std::vector<Node>& others = known.engine->nodes_->nodes();
+  std::unordered_multimap<std::uint32_t, int> number;
+  for (std::size_t i = 0; i < others.size(); ++i) number.emplace(node_seed(others[i]), static_cast<int>(i));
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const auto [first, last] = number.equal_range(node_seed(nodes[i]));
+    for (auto entry = first; entry != last; ++entry)
+      if (others[entry->second] == nodes[i]) known.node[i] = entry->second;
+  }
+  known.has_same_nodes = nodes == others;
+}
+
+std::shared_ptr<const Engine::NodeRows> Engine::node_rows(const Known& known) const {
+  const std::vector<Node>& nodes = nodes_->nodes();
   std::vector<GatherRow> rows(nodes.size());
   parallel_indices(nodes.size(), kGrain, [&](std::size_t i) {
-    rows[i] = gatherer_->gather_at_point(nodes[i], options_.node_samples,
-                                         hash_seed(options_.seed, hash_seed(kNodeStream, i)));
-    rows[i].reached.insert(rows[i].reached.end(), rows[i].through.begin(), rows[i].through.end());
-    rows[i].reached = to_patches(rows[i].reached);
+    if (known.node[i] >= 0) {
+      const auto other = static_cast<std::size_t>(known.node[i]);
+      const NodeRows& known_rows = *known.engine->node_rows_;
+      rows[i].reached = known_rows.patches.row(other);
+      for (Share& share : rows[i].reached) share.index = known.engine->slot_of_patch_[share.index];
+      rows[i].reached = patches_at(rows[i].reached);
+      rows[i].sky = known_rows.sky.row(other);
+      rows[i].exposure = known_rows.exposure[other];
+    } else {
+      rows[i] = gatherer_->surroundings_of_point(nodes[i], options_.node_samples, node_seed(nodes[i]));
+      rows[i].reached = to_patches(rows[i].reached);
+    }
   });
-  std::vector<char> is_exposed(nodes.size());
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    is_exposed[i] = rows[i].exposure >= kExposedNode;
-    node_sky_.append(rows[i].sky);
-    node_patches_.append(rows[i].reached);
+  auto found = std::make_shared<NodeRows>();
+  for (const GatherRow& row : rows) {
+    found->exposure.push_back(row.exposure);
+    found->patches.append(row.reached);
+    found->sky.append(row.sky);
   }
-  nodes_->finish(std::move(is_exposed));
+  return found;
+}
+
+// What nodes see through openings.
+void Engine::look_out_of_nodes(const Known& known) {
+  const std::vector<Node>& nodes = nodes_->nodes();
+  std::vector<GatherRow> rows(nodes.size());
+  parallel_indices(nodes.size(), kGrain, [&](std::size_t i) {
+    GatherRow& row = rows[i];
+    if (known.node[i] >= 0 && known.has_openings && known.has_same_patches) {
+      row.sky = known.engine->node_sky_.row(static_cast<std::size_t>(known.node[i]));
+      row.through = known.engine->node_through_.row(static_cast<std::size_t>(known.node[i]));
+      return;
+    }
+    row.exposure = node_rows_->exposure[i];
+    row.sky = node_rows_->sky.row(i);
+    gatherer_->look_through_openings(nodes[i], options_.node_samples, node_seed(nodes[i]), row);
+    row.through = to_patches(row.through);
+  });
+  for (const GatherRow& row : rows) {
+    node_sky_.append(row.sky);
+    node_through_.append(row.through);
+  }
+}
+
+void Engine::link_nodes(const Known& known) {
+  links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes());
+  PointLinks::Known known_links;
+  if (known.has_surroundings && known.engine->links_)
+    known_links = {known.engine->links_.get(), known.node, known.has_same_nodes, known.has_openings};
+  links_->prepare(beam_slots(), known_links);
+  facts_.link_bytes = links_->byte_count();
+}
+
+// Samples of a node depend on where it is alone, so that another object in the room does not change them.
+std::uint32_t Engine::node_seed(const Node& node) const {
+  std::uint32_t seed = hash_seed(options_.seed, kNodeStream);
+  for (const glm::vec3 v : {node.position, node.normal})
+    for (int axis = 0; axis < 3; ++axis) seed = hash_seed(seed, std::bit_cast<std::uint32_t>(v[axis]));
+  return seed;
 }
 
 // Patches that a beam may light: they see some of the sky.
@@ -188,7 +324,7 @@ std::vector<int> Engine::beam_slots() const {
 
 void Engine::light_always() {
   const int per_slot = mesh_->elements_per_slot();
-  lit_by_sources_ = direct_light_->deposit({}, slot_of_patch_, hash_seed(options_.seed, kBeamStream));
+  lit_by_sources_ = direct_light_->deposit({}, receivers_, hash_seed(options_.seed, kBeamStream));
   bright_always_ = bright_elements(lit_by_sources_);
   if (connects_emitters_)
     for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)

@@ -60,25 +60,44 @@ std::vector<int> Engine::first_wave() const {
   return wave;
 }
 
+Engine::PatchRow Engine::patch_row(int slot, const Known& known) const {
+  const int known_patch = known.has_surroundings ? known.engine->patch_of_slot_[slot] : -1;
+  const PatchRow* known_row = known_patch >= 0 ? &known.engine->patch_rows_[known_patch] : nullptr;
+  if (known_row && known.has_openings) return *known_row;
+  const std::uint32_t seed = hash_seed(options_.seed, hash_seed(kPatchStream, static_cast<std::uint64_t>(slot)));
+  PatchRow row;
+  if (known_row) {
+    row.around = known_row->around;
+  } else {
+    GatherRow around = gatherer_->surroundings_of_patch(slot, options_.patch_samples, seed);
+    around.reached = to_slots(around.reached);
+    row.around = std::make_shared<const GatherRow>(std::move(around));
+  }
+  GatherRow beyond;
+  beyond.exposure = row.around->exposure;
+  beyond.sky = row.around->sky;
+  gatherer_->look_through_openings(slot, options_.patch_samples, seed, beyond);
+  beyond.through = to_slots(beyond.through);
+  row.beyond = std::make_shared<const GatherRow>(std::move(beyond));
+  return row;
+}
+
 // Rows wave by wave: what a patch sees becomes a patch in the next wave, until nothing new is seen.
-void Engine::find_patches(std::vector<int> wave, std::vector<GatherRow>& rows) {
-  const int per_slot = mesh_->elements_per_slot();
+void Engine::find_patches(std::vector<int> wave, const Known& known) {
   while (!wave.empty()) {
     for (const int slot : wave) {
       patch_of_slot_[slot] = static_cast<int>(slot_of_patch_.size());
       slot_of_patch_.push_back(slot);
     }
-    const std::size_t base = rows.size();
-    rows.resize(base + wave.size());
-    parallel_indices(wave.size(), kGrain, [&](std::size_t i) {
-      const std::uint32_t seed = hash_seed(options_.seed, hash_seed(kPatchStream, static_cast<std::uint64_t>(wave[i])));
-      rows[base + i] = gatherer_->gather_over_patch(wave[i], options_.patch_samples, seed);
-    });
+    const std::size_t base = patch_rows_.size();
+    patch_rows_.resize(base + wave.size());
+    parallel_indices(wave.size(), kGrain,
+                     [&](std::size_t i) { patch_rows_[base + i] = patch_row(wave[i], known); });
     std::vector<int> next;
-    for (std::size_t i = base; i < rows.size(); ++i)
-      for (const std::vector<Share>* shares : {&rows[i].reached, &rows[i].through})
+    for (std::size_t i = base; i < patch_rows_.size(); ++i)
+      for (const std::vector<Share>* shares : {&patch_rows_[i].around->reached, &patch_rows_[i].beyond->through})
         for (const Share& share : *shares)
-          if (patch_of_slot_[share.index / per_slot] < 0) next.push_back(share.index / per_slot);
+          if (patch_of_slot_[share.index] < 0) next.push_back(share.index);
     std::sort(next.begin(), next.end());
     next.erase(std::unique(next.begin(), next.end()), next.end());
     wave = std::move(next);
@@ -86,21 +105,21 @@ void Engine::find_patches(std::vector<int> wave, std::vector<GatherRow>& rows) {
 }
 
 // Slots that see patches indoors without having been seen by them: then those are indoors, too.
-void Engine::find_unseen_patches(std::vector<GatherRow>& rows) {
+void Engine::find_unseen_patches(const Known& known) {
   for (std::uint64_t round = 0;; ++round) {
     std::vector<char> is_interior(patch_of_slot_.size(), 0);
-    for (std::size_t p = 0; p < rows.size(); ++p) is_interior[slot_of_patch_[p]] = is_interior_[p];
+    for (std::size_t p = 0; p < is_interior_.size(); ++p) is_interior[slot_of_patch_[p]] = is_interior_[p];
     const std::vector<int> unseen =
         slots_that_see(is_interior, patch_of_slot_, *mesh_, *rays_, hash_seed(options_.seed, kUnseenStream + round));
     if (unseen.empty()) return;
-    find_patches(unseen, rows);
+    find_patches(unseen, known);
     unseen_slots_.insert(unseen_slots_.end(), unseen.begin(), unseen.end());
-    mark_interior(rows);
+    mark_interior();
   }
 }
 
-void Engine::mark_interior(const std::vector<GatherRow>& rows) {
-  is_interior_.assign(rows.size(), 0);
+void Engine::mark_interior() {
+  is_interior_.assign(patch_rows_.size(), 0);
   std::vector<int> stack;
   const auto mark = [&](int patch) {
     if (patch < 0 || is_interior_[patch]) return;
@@ -110,28 +129,28 @@ void Engine::mark_interior(const std::vector<GatherRow>& rows) {
   // An emitter that sees the sky is a lamp outdoors, or the outside of a luminous wall.
   for (const int slot : first_slots())
     if (scene_.materials[faces_.faces[mesh_->slot(slot).face].material].opening >= 0 ||
-        rows[patch_of_slot_[slot]].escaped == 0)
+        patch_rows_[patch_of_slot_[slot]].around->escaped == 0)
       mark(patch_of_slot_[slot]);
   // What an opening sees is indoors, however small it is itself.
-  const auto patch_at = [&](const Share& share) { return patch_of_slot_[share.index / mesh_->elements_per_slot()]; };
+  const auto patch_at = [&](const Share& share) { return patch_of_slot_[share.index]; };
   for (const int patch : std::vector<int>(stack))
-    for (const Share& share : rows[patch].reached) mark(patch_at(share));
+    for (const Share& share : patch_rows_[patch].around->reached) mark(patch_at(share));
   for (const int slot : unseen_slots_) mark(patch_of_slot_[slot]);
   if (!scene_.point_sources.empty())
-    for (std::size_t p = 0; p < rows.size(); ++p) mark(static_cast<int>(p));
+    for (std::size_t p = 0; p < patch_rows_.size(); ++p) mark(static_cast<int>(p));
   // What a patch indoors sees is indoors if it sees a patch indoors itself. One ray that slips through an edge, between
   // slivers, meets the outside of a wall, which does not look back.
   std::vector<int> pending;
   while (!stack.empty()) {
     const int patch = stack.back();
     stack.pop_back();
-    for (const Share& share : rows[patch].reached)
+    for (const Share& share : patch_rows_[patch].around->reached)
       if (patch_at(share) >= 0 && !is_interior_[patch_at(share)]) pending.push_back(patch_at(share));
     if (!stack.empty()) continue;
     std::sort(pending.begin(), pending.end());
     pending.erase(std::unique(pending.begin(), pending.end()), pending.end());
     std::erase_if(pending, [&](int other) {
-      const std::vector<Share>& seen = rows[other].reached;
+      const std::vector<Share>& seen = patch_rows_[other].around->reached;
       if (std::none_of(seen.begin(), seen.end(),
                        [&](const Share& share) { return patch_at(share) >= 0 && is_interior_[patch_at(share)]; }))
         return false;
@@ -142,14 +161,15 @@ void Engine::mark_interior(const std::vector<GatherRow>& rows) {
   facts_.interior_patch_count = static_cast<int>(std::count(is_interior_.begin(), is_interior_.end(), 1));
 }
 
-void Engine::check_closed(const std::vector<GatherRow>& rows) {
+void Engine::check_closed() {
   double escaped = 0, total = 0, worst = 0;
   std::size_t worst_patch = 0;
-  for (std::size_t p = 0; p < rows.size(); ++p) {
+  for (std::size_t p = 0; p < patch_rows_.size(); ++p) {
     if (!is_interior_[p]) continue;
-    escaped += rows[p].escaped;
+    const double own = patch_rows_[p].around->escaped;
+    escaped += own;
     total += 1;
-    if (rows[p].escaped > worst) worst = rows[worst_patch = p].escaped;
+    if (own > worst) worst = own, worst_patch = p;
   }
   facts_.leak_share = total > 0 ? escaped / total : 0;
   if (facts_.leak_share <= kLeakTolerance) return;

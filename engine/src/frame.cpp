@@ -42,7 +42,7 @@ class FrameRenderer::Masks {
   int width_, samples_, scale_;
 };
 
-FrameRenderer::FrameRenderer(Engine& engine) : engine_(engine) {}
+FrameRenderer::FrameRenderer(const Engine& engine) : engine_(engine) {}
 FrameRenderer::~FrameRenderer() = default;
 
 PrimaryHits trace_primary(const SceneGeometry& scene, const View& view) {
@@ -167,10 +167,11 @@ void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const
 }
 
 // Light of sky and of surfaces, between nodes. Extrapolation beyond the outermost nodes never makes it negative.
-void FrameRenderer::add_smooth_light(const ViewSamples& samples, bool components, Frame& frame) const {
+void FrameRenderer::add_smooth_light(const ViewSamples& samples, const Lighting& lighting, bool components,
+                                     Frame& frame) const {
   const std::size_t pixel_count = samples.centre.size();
   std::vector<glm::vec4> sky, indirect;
-  engine_.shown_radiance(sky, indirect);
+  engine_.shown_radiance(lighting, sky, indirect);
   if (!components)
     for (std::size_t i = 0; i < sky.size(); ++i) sky[i] += indirect[i];
   parallel_indices(pixel_count, kBlock, [&](std::size_t p) {
@@ -190,7 +191,7 @@ void FrameRenderer::add_smooth_light(const ViewSamples& samples, bool components
   });
 }
 
-Frame FrameRenderer::render(const View& view, FrameOptions options) {
+Frame FrameRenderer::render(const View& view, const Lighting& lighting, FrameOptions options) {
   const TracePhase phase(engine_.trace(), "frame");
   view.validate();
   options.edge_samples = std::max(1, options.edge_samples);
@@ -200,12 +201,12 @@ Frame FrameRenderer::render(const View& view, FrameOptions options) {
     samples_ = std::make_unique<ViewSamples>(engine_, view, options.edge_samples);
   }
   const ViewSamples& samples = *samples_;
-  const Condition& condition = engine_.lighting().condition;
+  const Condition& condition = lighting.condition;
   Masks masks(view, options.edge_samples);
   const bool use_volumes = options.visibility == Visibility::kVolumes;
   if (use_volumes) {
     const TracePhase volume_phase(engine_.trace(), "volumes");
-    render_masks(view, masks);
+    render_masks(view, condition.beams, masks);
   }
 
   const std::size_t pixel_count = samples.centre.size();
@@ -218,7 +219,7 @@ Frame FrameRenderer::render(const View& view, FrameOptions options) {
       part->resize(pixel_count, glm::vec3(0));
   {
     const TracePhase smooth_phase(engine_.trace(), "smooth light");
-    add_smooth_light(samples, options.components, frame);
+    add_smooth_light(samples, lighting, options.components, frame);
   }
   // Without components everything goes into the picture at once.
   std::vector<glm::vec3>&sun = options.components ? frame.sun : frame.radiance,
@@ -247,7 +248,7 @@ Frame FrameRenderer::render(const View& view, FrameOptions options) {
 
 // Share of each beam at each sample: lit or not by the stencil, times the transmittance of the openings that it
 // counted.
-void FrameRenderer::render_masks(const View& view, Masks& masks) {
+void FrameRenderer::render_masks(const View& view, const std::vector<Beam>& beams, Masks& masks) {
   if (!volumes_) {
     std::vector<glm::vec3> vertices;
     std::vector<glm::uvec3> opaque;
@@ -276,7 +277,7 @@ void FrameRenderer::render_masks(const View& view, Masks& masks) {
   const glm::dvec3 origin = engine_.faces().origin;
   const VolumeCamera camera{view.position - origin, view.target - origin,       view.up,
                             view.vertical_fov_rad,  view.width * masks.scale(), view.height * masks.scale()};
-  for (const Beam& beam : engine_.lighting().condition.beams) {
+  for (const Beam& beam : beams) {
     const BeamMask mask = volumes_->render(camera, glm::dvec3(beam.direction_to_source));
     std::vector<float> transmittance;
     for (const VolumeGroup& group : volume_groups_)

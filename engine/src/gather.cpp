@@ -187,33 +187,51 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
   }
 }
 
-GatherRow Gatherer::gather_at_point(const Node& point, GatherSamples samples, std::uint32_t seed) const {
+GatherRow Gatherer::surroundings_of_point(const Node& point, GatherSamples samples, std::uint32_t seed) const {
   GatherRow row;
-  const Origin origin{point.position, point.normal};
-  const auto origin_of = [&](glm::vec2) { return origin; };
-  gather_hemisphere(origin_of, samples.hemisphere, seed, row);
-  gather_openings(origin, origin_of, samples.openings, seed, row);
-  merge_shares(row.through);
-  merge_shares(row.sky);
+  gather_hemisphere([&](glm::vec2) { return Origin{point.position, point.normal}; }, samples.hemisphere, seed, row);
   return row;
 }
 
-GatherRow Gatherer::gather_over_patch(int slot_index, GatherSamples samples, std::uint32_t seed) const {
+void Gatherer::look_through_openings(const Node& point, GatherSamples samples, std::uint32_t seed,
+                                     GatherRow& row) const {
+  const Origin origin{point.position, point.normal};
+  gather_openings(origin, [&](glm::vec2) { return origin; }, samples.openings, seed, row);
+  merge_shares(row.through);
+  merge_shares(row.sky);
+}
+
+// A place of a patch from two uniform numbers.
+auto Gatherer::places_on(int slot_index) const {
   const Slot slot = mesh_.slot(slot_index);
   const Face& face = mesh_.faces().faces[slot.face];
   const glm::vec3 normal = slot.side == 0 ? face.normal : -face.normal;
-  const auto origin_of = [&](glm::vec2 u) {
+  return [this, slot, normal](glm::vec2 u) {
     const glm::vec2 st = mesh_.cell_parameters(slot.face, slot.cell, mesh_.sample_local(slot.face, u));
     return Origin{mesh_.lifted_position(slot.face, slot.side, st), normal};
   };
+}
+
+GatherRow Gatherer::surroundings_of_patch(int slot, GatherSamples samples, std::uint32_t seed) const {
   GatherRow row;
-  gather_hemisphere(origin_of, samples.hemisphere, seed, row);
+  gather_hemisphere(places_on(slot), samples.hemisphere, seed, row);
+  return row;
+}
+
+void Gatherer::look_through_openings(int slot_index, GatherSamples samples, std::uint32_t seed, GatherRow& row) const {
+  const Slot slot = mesh_.slot(slot_index);
+  const auto origin_of = places_on(slot_index);
   const glm::vec2 middle = mesh_.grid(slot.face).is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3);
   const Origin centre{mesh_.lifted_position(slot.face, slot.side, mesh_.cell_parameters(slot.face, slot.cell, middle)),
-                      normal};
+                      origin_of(glm::vec2(0)).normal};
   gather_openings(centre, origin_of, samples.openings, seed, row);
   merge_shares(row.through);
   merge_shares(row.sky);
+}
+
+GatherRow Gatherer::gather_at_point(const Node& point, GatherSamples samples, std::uint32_t seed) const {
+  GatherRow row = surroundings_of_point(point, samples, seed);
+  look_through_openings(point, samples, seed, row);
   return row;
 }
 

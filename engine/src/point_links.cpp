@@ -16,17 +16,20 @@ constexpr float kLeastDistance2 = 1e-15f;    // keeps 0 / 0 out of weights that 
 constexpr std::size_t kBlocksAtOnce = 8;
 
 // Shares of light that arrive at the end of segments: 0 behind something opaque, else the transmittance on the way.
-void seen_shares(const RayScene& rays, const std::vector<Ray>& segments, std::vector<float>& shares) {
+// is_glazed: whether there are openings on the way.
+void seen_shares(const RayScene& rays, const std::vector<Ray>& segments, std::vector<float>& shares,
+                 std::vector<std::uint8_t>& is_glazed) {
   std::vector<std::uint8_t> is_stopped(segments.size());
   rays.occluded(RayScene::What::kOpaque, segments, is_stopped, RayScene::Order::kCoherent);
   shares.resize(segments.size());
   for (std::size_t k = 0; k < segments.size(); ++k) shares[k] = is_stopped[k] ? 0.f : 1.f;
+  is_glazed.assign(segments.size(), 0);
   if (!rays.has_openings()) return;
-  rays.occluded(RayScene::What::kOpenings, segments, is_stopped, RayScene::Order::kCoherent);
+  rays.occluded(RayScene::What::kOpenings, segments, is_glazed, RayScene::Order::kCoherent);
   std::vector<Ray> through;
   std::vector<std::size_t> index;
   for (std::size_t k = 0; k < segments.size(); ++k)
-    if (is_stopped[k] && shares[k] > 0) {
+    if ((is_glazed[k] &= shares[k] > 0)) {
       through.push_back(segments[k]);
       index.push_back(k);
     }
@@ -75,12 +78,37 @@ glm::vec3 PointLinks::exposed_middle(int slot_index, glm::vec3 normal) const {
       ->origin;
 }
 
-void PointLinks::link(int slot_index) {
+std::uint8_t PointLinks::Link::seen_of(int point) const {
+  const int wanted = point / static_cast<int>(kBlock);
+  const auto found = std::lower_bound(block.begin(), block.end(), wanted);
+  if (found == block.end() || *found != wanted) return 0;
+  return seen[static_cast<std::size_t>(found - block.begin()) * kBlock + static_cast<std::size_t>(point) % kBlock];
+}
+
+const float* PointLinks::Link::near_weight_of(int point, std::size_t element_count) const {
+  const auto found = std::lower_bound(near_point.begin(), near_point.end(), point);
+  if (found == near_point.end() || *found != point) return nullptr;
+  return &near_weight[static_cast<std::size_t>(found - near_point.begin()) * element_count];
+}
+
+int PointLinks::KnownPoints::number(int point) const {
+  const int known_point = link ? known.point[static_cast<std::size_t>(point)] : -1;
+  if (known_point < 0 || known.has_same_glazing) return known_point;
+  return std::binary_search(link->glazed_point.begin(), link->glazed_point.end(), known_point) ? -1 : known_point;
+}
+
+std::shared_ptr<const PointLinks::Link> PointLinks::link(int slot_index, const Known& known) const {
+  std::shared_ptr<const Link> before;
+  if (known.links) {
+    const std::lock_guard lock(known.links->mutex_);
+    before = known.links->links_[slot_index];
+  }
+  if (before && known.has_same_points && (known.has_same_glazing || before->glazed_point.empty())) return before;
   const Slot slot = mesh_.slot(slot_index);
   const Face& face = mesh_.faces().faces[slot.face];
   const glm::vec3 normal = slot.side == 0 ? face.normal : -face.normal, middle = exposed_middle(slot_index, normal);
   const float size2 = 2 * mesh_.cell_area(slot.face, slot.cell), size = std::sqrt(size2);
-  Link& link = links_[slot_index];
+  auto link = std::make_shared<Link>();
   std::vector<int> far_points;
   std::vector<float> height(kBlock), distance2(kBlock), cosine(kBlock);
   for (std::size_t begin = 0; begin < x_.size(); begin += kBlock) {
@@ -95,38 +123,71 @@ void PointLinks::link(int slot_index) {
     if (!any) continue;
     for (std::size_t k = 0; k < kBlock && begin + k < point_count_; ++k)
       if (height[k] > 0 && cosine[k] > -size)
-        (distance2[k] > kFar * kFar * size2 ? far_points : link.near_point).push_back(static_cast<int>(begin + k));
+        (distance2[k] > kFar * kFar * size2 ? far_points : link->near_point).push_back(static_cast<int>(begin + k));
   }
-  link_far(link, middle, far_points);
-  link_near(link, slot_index, normal);
-  link.is_ready = true;
+  const KnownPoints known_points{before.get(), known};
+  link_far(*link, middle, far_points, known_points);
+  link_near(*link, slot_index, normal, known_points);
+  // What is taken over may be glazed, too.
+  for (int i = 0; before && known.has_same_glazing && i < static_cast<int>(point_count_); ++i)
+    if (known.point[i] >= 0 &&
+        std::binary_search(before->glazed_point.begin(), before->glazed_point.end(), known.point[i]))
+      link->glazed_point.push_back(i);
+  std::sort(link->glazed_point.begin(), link->glazed_point.end());
+  link->glazed_point.erase(std::unique(link->glazed_point.begin(), link->glazed_point.end()),
+                           link->glazed_point.end());
+  return link;
 }
 
-void PointLinks::link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points) const {
+void PointLinks::link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points,
+                          const KnownPoints& known) const {
   std::vector<Ray> segments;
-  for (const int i : far_points) segments.push_back({middle, glm::vec3(x_[i], y_[i], z_[i]) - middle, 0, 1});
-  std::vector<float> shares;
-  seen_shares(rays_, segments, shares);
+  std::vector<std::uint8_t> seen(far_points.size());
+  std::vector<std::size_t> unknown;
   for (std::size_t k = 0; k < far_points.size(); ++k) {
-    if (shares[k] <= 0) continue;
+    const int i = far_points[k], known_point = known.number(i);
+    if (known_point >= 0) {
+      seen[k] = known.link->seen_of(known_point);
+      continue;
+    }
+    unknown.push_back(k);
+    segments.push_back({middle, glm::vec3(x_[i], y_[i], z_[i]) - middle, 0, 1});
+  }
+  std::vector<float> shares;
+  std::vector<std::uint8_t> is_glazed;
+  seen_shares(rays_, segments, shares, is_glazed);
+  for (std::size_t k = 0; k < unknown.size(); ++k) {
+    if (is_glazed[k]) link.glazed_point.push_back(far_points[unknown[k]]);
+    if (shares[k] > 0) seen[unknown[k]] = static_cast<std::uint8_t>(std::lround(255 * std::sqrt(shares[k])));
+  }
+  for (std::size_t k = 0; k < far_points.size(); ++k) {
+    if (seen[k] == 0) continue;
     const int block = far_points[k] / static_cast<int>(kBlock);
     if (link.block.empty() || link.block.back() != block) {
       link.block.push_back(block);
       link.seen.resize(link.seen.size() + kBlock, 0);
     }
-    link.seen[link.seen.size() - kBlock + far_points[k] % static_cast<int>(kBlock)] =
-        static_cast<std::uint8_t>(std::lround(255 * std::sqrt(shares[k])));
+    link.seen[link.seen.size() - kBlock + far_points[k] % static_cast<int>(kBlock)] = seen[k];
   }
 }
 
-void PointLinks::link_near(Link& link, int slot, glm::vec3 normal) const {
-  const int element_count = mesh_.elements_per_slot();
+void PointLinks::link_near(Link& link, int slot, glm::vec3 normal, const KnownPoints& known) const {
+  const auto element_count = static_cast<std::size_t>(mesh_.elements_per_slot());
   std::vector<ElementShape> shapes;
-  for (int e = 0; e < element_count; ++e) shapes.push_back(element_shape(mesh_, slot * element_count + e));
+  for (std::size_t e = 0; e < element_count; ++e)
+    shapes.push_back(element_shape(mesh_, slot * mesh_.elements_per_slot() + static_cast<int>(e)));
   std::vector<Ray> segments;
   std::vector<float> weights, shares;
+  std::vector<std::size_t> unknown;  // places in `weights` that a segment each speaks for
   std::vector<int> kept;
   for (const int i : link.near_point) {
+    const int known_point = known.number(i);
+    const float* before = known_point >= 0 ? known.link->near_weight_of(known_point, element_count) : nullptr;
+    if (before) {
+      kept.push_back(i);
+      weights.insert(weights.end(), before, before + element_count);
+      continue;
+    }
     const glm::vec3 point(x_[i], y_[i], z_[i]), point_normal(nx_[i], ny_[i], nz_[i]);
     bool any = false;
     for (const ElementShape& shape : shapes) {
@@ -138,28 +199,66 @@ void PointLinks::link_near(Link& link, int slot, glm::vec3 normal) const {
       continue;
     }
     kept.push_back(i);
-    for (const ElementShape& shape : shapes) segments.push_back({point, shape.middle - point, 0, 1});
+    for (std::size_t e = 0; e < element_count; ++e) {
+      unknown.push_back(weights.size() - element_count + e);
+      segments.push_back({point, shapes[e].middle - point, 0, 1});
+    }
   }
-  seen_shares(rays_, segments, shares);
-  for (std::size_t k = 0; k < weights.size(); ++k) weights[k] *= shares[k];
+  std::vector<std::uint8_t> is_glazed;
+  seen_shares(rays_, segments, shares, is_glazed);
+  for (std::size_t k = 0; k < unknown.size(); ++k) {
+    weights[unknown[k]] *= shares[k];
+    if (is_glazed[k]) link.glazed_point.push_back(kept[unknown[k] / element_count]);
+  }
   link.near_point = std::move(kept);
   link.near_weight = std::move(weights);
 }
 
-void PointLinks::prepare(const std::vector<int>& slots) {
-  std::vector<int> missing;
-  for (const int slot : slots)
-    if (!links_[slot].is_ready) missing.push_back(slot);
+std::size_t PointLinks::bytes_of(const Link& link) const {
+  return sizeof(int) * (link.block.size() + link.near_point.size() + link.glazed_point.size()) + link.seen.size() +
+         sizeof(float) * link.near_weight.size();
+}
+
+void PointLinks::prepare(const std::vector<int>& slots, const Known& known) const {
   constexpr std::size_t kBatch = 256;  // of patches, after which the memory is looked at
-  for (std::size_t begin = 0; begin < missing.size() && byte_count_ < kMemory; begin += kBatch) {
-    const std::size_t end = std::min(missing.size(), begin + kBatch);
-    parallel_indices(end - begin, 1, [&](std::size_t k) { link(missing[begin + k]); });
-    for (std::size_t k = begin; k < end; ++k) {
-      const Link& made = links_[missing[k]];
-      byte_count_ += sizeof(int) * (made.block.size() + made.near_point.size()) + made.seen.size() +
-                     sizeof(float) * made.near_weight.size();
+  for (std::size_t begin = 0; begin < slots.size() && byte_count() < kMemory; begin += kBatch)
+    links_of({slots.begin() + static_cast<std::ptrdiff_t>(begin),
+              slots.begin() + static_cast<std::ptrdiff_t>(std::min(slots.size(), begin + kBatch))},
+             known);
+}
+
+std::size_t PointLinks::byte_count() const {
+  const std::lock_guard lock(mutex_);
+  return byte_count_;
+}
+
+// The links of some patches, found now if need be. Without room for more, what other conditions needed is given up.
+std::vector<std::shared_ptr<const PointLinks::Link>> PointLinks::links_of(const std::vector<int>& slots,
+                                                                          const Known& known) const {
+  std::vector<std::shared_ptr<const Link>> found(slots.size());
+  std::vector<std::size_t> missing;
+  {
+    const std::lock_guard lock(mutex_);
+    for (std::size_t k = 0; k < slots.size(); ++k) {
+      found[k] = links_[slots[k]];
+      if (!found[k]) missing.push_back(k);
     }
   }
+  if (missing.empty()) return found;
+  parallel_indices(missing.size(), 1,
+                   [&](std::size_t k) { found[missing[k]] = link(slots[missing[k]], known); });
+  const std::lock_guard lock(mutex_);
+  for (const std::size_t k : missing) {
+    const Link& made = *found[k];
+    if (links_[slots[k]]) continue;
+    if (byte_count_ >= kMemory) {
+      std::fill(links_.begin(), links_.end(), nullptr);
+      byte_count_ = 0;
+    }
+    byte_count_ += bytes_of(made);
+    links_[slots[k]] = found[k];
+  }
+  return found;
 }
 
 PointLinks::LitPatch PointLinks::lit_patch(const std::vector<BrightElement>& bright, std::size_t first,
@@ -168,8 +267,7 @@ PointLinks::LitPatch PointLinks::lit_patch(const std::vector<BrightElement>& bri
   const Slot slot = mesh_.slot(slot_index);
   const Face& face = mesh_.faces().faces[slot.face];
   const glm::vec2 middle = mesh_.grid(slot.face).is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3);
-  LitPatch patch{&links_[slot_index], first, last, glm::vec3(0), slot.side == 0 ? face.normal : -face.normal,
-                 glm::vec3(0)};
+  LitPatch patch{nullptr, first, last, glm::vec3(0), slot.side == 0 ? face.normal : -face.normal, glm::vec3(0)};
   float sum = 0;
   for (std::size_t k = first; k < last; ++k) {
     const int element = bright[k].element % per_slot;
@@ -185,26 +283,20 @@ PointLinks::LitPatch PointLinks::lit_patch(const std::vector<BrightElement>& bri
   return patch;
 }
 
-void PointLinks::add_irradiance(const std::vector<BrightElement>& bright, std::vector<glm::vec3>& irradiance) {
+void PointLinks::add_irradiance(const std::vector<BrightElement>& bright, std::vector<glm::vec3>& irradiance) const {
   const int per_slot = mesh_.elements_per_slot();
   std::vector<int> slots;
   for (const BrightElement& b : bright)
     if (slots.empty() || slots.back() != b.element / per_slot) slots.push_back(b.element / per_slot);
-  // Without room for more, what other conditions needed is given up.
-  if (byte_count_ >= kMemory) {
-    std::fill(links_.begin(), links_.end(), Link{});
-    byte_count_ = 0;
-  }
-  for (const int slot : slots)
-    if (!links_[slot].is_ready) {
-      prepare(slots);
-      break;
-    }
+  const std::vector<std::shared_ptr<const Link>> links = links_of(slots, {});
   std::vector<LitPatch> lit(slots.size());
   std::vector<std::size_t> first{0};
   for (std::size_t k = 1; k <= bright.size(); ++k)
     if (k == bright.size() || bright[k].element / per_slot != bright[k - 1].element / per_slot) first.push_back(k);
-  parallel_indices(slots.size(), 16, [&](std::size_t k) { lit[k] = lit_patch(bright, first[k], first[k + 1]); });
+  parallel_indices(slots.size(), 16, [&](std::size_t k) {
+    lit[k] = lit_patch(bright, first[k], first[k + 1]);
+    lit[k].link = links[k];
+  });
 
   const std::size_t block_count = x_.size() / kBlock;
   parallel_indices((block_count + kBlocksAtOnce - 1) / kBlocksAtOnce, 1, [&](std::size_t chunk) {

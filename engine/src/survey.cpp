@@ -41,6 +41,7 @@ class Surveyor {
 
   std::vector<char> run() {
     for (const PointSource& source : scene_.point_sources) {
+      begin_source(2 * faces_.faces.size() + static_cast<std::size_t>(&source - scene_.point_sources.data()));
       const SobolSequence points = next_sequence();
       for (std::uint32_t i = 0; i < kRaysPerSource; ++i)
         rays_.push_back({glm::vec3(source.position - faces_.origin), sample_sphere(points.point2(i))});
@@ -52,6 +53,7 @@ class Surveyor {
       if (!is_opening && material.luminance == glm::vec3(0)) continue;
       // Room sides of openings; both sides of emitters, since either may look into a room.
       for (Side side = is_opening ? 1 : 0; side < 2; ++side) {
+        begin_source(2 * f + static_cast<std::size_t>(side));
         if (!is_opening && faces_.is_inside_solid(static_cast<int>(f), side)) {
           // A luminous solid may be a room with luminous walls: its inside must speak for itself.
           if (!sees_only_itself(static_cast<int>(f))) continue;
@@ -65,7 +67,13 @@ class Surveyor {
   }
 
  private:
-  SobolSequence next_sequence() { return SobolSequence(hash_seed(seed_, ++sequence_)); }
+  SobolSequence next_sequence() { return SobolSequence(hash_seed(source_seed_, ++sequence_)); }
+
+  // Each source has samples of its own: one less changes nothing that others find.
+  void begin_source(std::uint64_t number) {
+    source_seed_ = hash_seed(seed_, number);
+    sequence_ = 0;
+  }
 
   void start_from(int face, Side side) {
     const SobolSequence points = next_sequence();
@@ -124,7 +132,7 @@ class Surveyor {
   const SceneGeometry& scene_;
   const RayScene& ray_scene_;
   Faces& faces_;
-  std::uint32_t seed_;
+  std::uint32_t seed_, source_seed_ = 0;
   std::uint64_t sequence_ = 0;
   std::vector<char> is_indoors_;
   std::vector<Ray> rays_;

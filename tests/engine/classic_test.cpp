@@ -48,36 +48,39 @@ struct Furnace {
 TEST(ProgressiveRadiosity, FillsAFurnaceToItsClosedForm) {
   const Furnace furnace;
   for (const float rho : {0.f, 0.5f, 0.8f}) {
-    ProgressiveRadiosity light = furnace.make(rho, 1);
-    light.shoot(1 << 20, 1e-6);
-    for (const glm::vec3& e : light.irradiance()) EXPECT_NEAR(e.y * (1 - rho), 1, 1e-5) << "rho " << rho;
+    const ProgressiveRadiosity shooting = furnace.make(rho, 1);
+    ShootingState light = shooting.dark();
+    shooting.shoot(light, 1 << 20, 1e-6);
+    for (const glm::vec3& e : light.irradiance) EXPECT_NEAR(e.y * (1 - rho), 1, 1e-5) << "rho " << rho;
   }
 }
 
 TEST(ProgressiveRadiosity, FluxInFlightFallsWithEveryRound) {
-  ProgressiveRadiosity light = Furnace().make(0.8f, 1);
-  double before = light.unshot_share();
+  const ProgressiveRadiosity shooting = Furnace().make(0.8f, 1);
+  ShootingState light = shooting.dark();
+  double before = shooting.unshot_share(light);
   EXPECT_GT(before, 0.9);
   for (int round = 0; round < 10; ++round) {
-    EXPECT_EQ(light.shoot(Furnace::kCount, 1e-9), Furnace::kCount);
-    EXPECT_LT(light.unshot_share(), before);
-    before = light.unshot_share();
+    EXPECT_EQ(shooting.shoot(light, Furnace::kCount, 1e-9), Furnace::kCount);
+    EXPECT_LT(shooting.unshot_share(light), before);
+    before = shooting.unshot_share(light);
   }
 }
 
 TEST(ProgressiveRadiosity, ReplacedDirectLightLeavesNothingOfTheOld) {
-  ProgressiveRadiosity light = Furnace().make(0.7f, 0), fresh = Furnace().make(0.7f, 0);
+  const ProgressiveRadiosity shooting = Furnace().make(0.7f, 0);
+  ShootingState light = shooting.dark(), fresh = shooting.dark();
   std::vector<glm::vec3> morning(Furnace::kCount, glm::vec3(0)), evening = morning;
   morning[0] = glm::vec3(1000, 900, 800);
   evening[5] = glm::vec3(100, 200, 300);
-  light.replace_direct(morning);
-  light.shoot(3, 1e-6);  // interrupted
-  light.replace_direct(evening);
-  light.shoot(1 << 20, 1e-6);
-  fresh.replace_direct(evening);
-  fresh.shoot(1 << 20, 1e-6);
+  shooting.replace_direct(light, morning);
+  shooting.shoot(light, 3, 1e-6);  // interrupted
+  shooting.replace_direct(light, evening);
+  shooting.shoot(light, 1 << 20, 1e-6);
+  shooting.replace_direct(fresh, evening);
+  shooting.shoot(fresh, 1 << 20, 1e-6);
   for (int p = 0; p < Furnace::kCount; ++p)
-    for (int c = 0; c < 3; ++c) EXPECT_NEAR(light.irradiance()[p][c], fresh.irradiance()[p][c], 1e-2) << p << ' ' << c;
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(light.irradiance[p][c], fresh.irradiance[p][c], 1e-2) << p << ' ' << c;
 }
 
 TEST(Classic, ForwardRaysCarryTheFluxOfTheOpening) {
@@ -86,8 +89,8 @@ TEST(Classic, ForwardRaysCarryTheFluxOfTheOpening) {
   const glm::vec3 to_sun = glm::normalize(glm::vec3(0.2f, 0.3f, 1));
   Condition condition = uniform_sky(5000);
   condition.beams.push_back({to_sun, glm::vec3(80000)});
-  engine.relight(condition);
-  const Lighting& light = engine.lighting();
+  const auto lighting = engine.relight(condition);
+  const Lighting& light = *lighting;
   double sun = 0, sky = 0;
   for (std::size_t p = 0; p < light.patch_sun.size(); ++p) {
     const Slot slot = engine.mesh().slot(engine.patch_slots()[p]);
@@ -107,37 +110,35 @@ TEST(Classic, AgreesWithTheGatheringMethodInTheMean) {
   Engine classic(roof_light_room(0.6f, 0.8f), tregenza(), options);
   options.method = Method::kGather;
   Engine gather(roof_light_room(0.6f, 0.8f), tregenza(), options);
-  classic.relight(condition);
-  gather.relight(condition);
+  const auto by_classic = classic.relight(condition), by_gather = gather.relight(condition);
   double ours = 0, theirs = 0;
   for (std::size_t p = 0; p < classic.patch_areas().size(); ++p) {
-    ours += classic.patch_areas()[p] * classic.lighting().patch_irradiance[p].y;
-    theirs += gather.patch_areas()[p] * gather.lighting().patch_irradiance[p].y;
+    ours += classic.patch_areas()[p] * by_classic->patch_irradiance[p].y;
+    theirs += gather.patch_areas()[p] * by_gather->patch_irradiance[p].y;
   }
   EXPECT_NEAR(ours / theirs, 1, 5e-3);
-  const EnergyAudit audit = classic.audit(1 << 16);
+  const EnergyAudit audit = classic.audit(*by_classic, 1 << 16);
   EXPECT_NEAR((audit.absorbed + audit.out).y / audit.in().y, 1, 5e-3);
 }
 
 TEST(Classic, StepsLeadToTheAnswerOfOneRelighting) {
   Condition condition = uniform_sky(5000);
-  Engine whole(roof_light_room(0.6f), tregenza(), classic_options()),
-      stepped(roof_light_room(0.6f), tregenza(), classic_options());
-  whole.relight(condition);
-  stepped.begin_relight(uniform_sky(100));
-  stepped.continue_relight(5);  // interrupted by a newer condition
-  stepped.begin_relight(condition);
-  double before = stepped.lighting().unshot_share;
+  const Engine engine(roof_light_room(0.6f), tregenza(), classic_options());
+  const auto whole = engine.relight(condition);
+  Lighting interrupted = engine.begin_relight(uniform_sky(100), nullptr);
+  engine.continue_relight(interrupted, 5);
+  Lighting stepped = engine.begin_relight(condition, &interrupted);
+  double before = stepped.unshot_share;
   int steps = 0;
-  while (stepped.continue_relight(50)) {
-    EXPECT_LT(stepped.lighting().unshot_share, before);
-    before = stepped.lighting().unshot_share;
+  while (engine.continue_relight(stepped, 50)) {
+    EXPECT_LT(stepped.unshot_share, before);
+    before = stepped.unshot_share;
     ++steps;
   }
   EXPECT_GT(steps, 2);
-  for (std::size_t p = 0; p < whole.lighting().patch_irradiance.size(); ++p) {
-    const float truth = whole.lighting().patch_irradiance[p].y;
-    EXPECT_NEAR(stepped.lighting().patch_irradiance[p].y, truth, 0.01f * truth + 1);
+  for (std::size_t p = 0; p < whole->patch_irradiance.size(); ++p) {
+    const float truth = whole->patch_irradiance[p].y;
+    EXPECT_NEAR(stepped.patch_irradiance[p].y, truth, 0.01f * truth + 1);
   }
 }
 
@@ -146,8 +147,9 @@ TEST(Classic, OtherMethodsDoNotRelightInSteps) {
   options.method = Method::kGather;
   options.target_patch_count = 100;
   Engine engine(roof_light_room(0.5f), tregenza(), options);
-  EXPECT_THROW(engine.begin_relight(uniform_sky(1)), InputError);
-  EXPECT_THROW(engine.continue_relight(1), InputError);
+  Lighting lighting;
+  EXPECT_THROW(engine.begin_relight(uniform_sky(1), nullptr), InputError);
+  EXPECT_THROW(engine.continue_relight(lighting, 1), InputError);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@ namespace {
 
 using test::add_box;
 using test::diffuse;
+using test::illuminance;
 using test::roof_light_room;
 using test::tregenza;
 using test::uniform_sky;
@@ -30,11 +31,11 @@ SolveOptions small_options() {
 
 TEST(Engine, SkyThroughARoofLightMatchesTheClosedForm) {
   Engine engine(roof_light_room(0), tregenza(), small_options());
-  engine.relight(uniform_sky(1000));
+  const auto light = engine.relight(uniform_sky(1000));
   // Under the middle of a 2 x 2 m hole at 3 m: four corners of 1 x 1 at 3.
   const double x = 1.0 / 3, root = std::sqrt(1 + x * x);
   const double integral = 4 * 0.5 * 2 * (x / root * std::atan(x / root));
-  const auto e = engine.illuminance({{2, 2, 0}}, {{0, 0, 1}}, kSensorSamples);
+  const auto e = illuminance(engine, *light, {{2, 2, 0}}, {{0, 0, 1}}, kSensorSamples);
   EXPECT_NEAR(e[0].sky.y / (1000 * integral), 1, 2e-3);
   EXPECT_EQ(e[0].indirect.y, 0);
 }
@@ -42,10 +43,8 @@ TEST(Engine, SkyThroughARoofLightMatchesTheClosedForm) {
 TEST(Engine, GlassTakesItsShareOnce) {
   Engine clear(roof_light_room(0), tregenza(), small_options()),
       tinted(roof_light_room(0, 0.5f), tregenza(), small_options());
-  clear.relight(uniform_sky(1000));
-  tinted.relight(uniform_sky(1000));
-  const auto a = clear.illuminance({{1, 2, 0}}, {{0, 0, 1}}, kSensorSamples);
-  const auto b = tinted.illuminance({{1, 2, 0}}, {{0, 0, 1}}, kSensorSamples);
+  const auto a = illuminance(clear, *clear.relight(uniform_sky(1000)), {{1, 2, 0}}, {{0, 0, 1}}, kSensorSamples);
+  const auto b = illuminance(tinted, *tinted.relight(uniform_sky(1000)), {{1, 2, 0}}, {{0, 0, 1}}, kSensorSamples);
   EXPECT_NEAR(b[0].sky.y, 0.5f * a[0].sky.y, 1e-3f * a[0].sky.y);
 }
 
@@ -53,8 +52,7 @@ TEST(Engine, FluxInIsFluxAbsorbedAndOut) {
   Engine engine(roof_light_room(0.6f, 0.8f), tregenza(), small_options());
   Condition condition = uniform_sky(5000, 800);
   condition.beams.push_back({glm::normalize(glm::vec3(0.2f, 0.3f, 1)), glm::vec3(80000)});
-  engine.relight(condition);
-  const EnergyAudit audit = engine.audit(1 << 16);
+  const EnergyAudit audit = engine.audit(*engine.relight(condition), 1 << 16);
   EXPECT_GT(audit.in_beams.y, 0);
   EXPECT_NEAR((audit.absorbed + audit.out).y / audit.in().y, 1, 1e-3);
 }
@@ -65,10 +63,9 @@ TEST(Engine, RelightingIsTheSameAsSolvingAfresh) {
   Condition sunny = uniform_sky(3000);
   sunny.beams.push_back({glm::normalize(glm::vec3(0.3f, 0.1f, 1)), glm::vec3(60000)});
   engine.relight(sunny);
-  engine.relight(uniform_sky(1234));
-  fresh.relight(uniform_sky(1234));
-  EXPECT_EQ(engine.lighting().node_indirect, fresh.lighting().node_indirect);
-  EXPECT_EQ(engine.lighting().node_sky, fresh.lighting().node_sky);
+  const auto again = engine.relight(uniform_sky(1234)), first = fresh.relight(uniform_sky(1234));
+  EXPECT_EQ(again->node_indirect, first->node_indirect);
+  EXPECT_EQ(again->node_sky, first->node_sky);
 }
 
 TEST(Engine, LightAddsUp) {
@@ -80,9 +77,10 @@ TEST(Engine, LightAddsUp) {
   const std::vector<glm::vec3> up(3, {0, 0, 1});
   std::vector<double> total;
   for (const Condition* condition : {&sky, &sun, &both}) {
-    engine.relight(*condition);
+    const auto light = engine.relight(*condition);
     double sum = 0;
-    for (const Irradiance& e : engine.illuminance(points, up, kSensorSamples)) sum += (e.direct + e.sky + e.indirect).y;
+    for (const Irradiance& e : illuminance(engine, *light, points, up, kSensorSamples))
+      sum += (e.direct + e.sky + e.indirect).y;
     total.push_back(sum);
   }
   EXPECT_NEAR((total[0] + total[1]) / total[2], 1, 1e-5);
@@ -95,8 +93,7 @@ TEST(Engine, AnswerDoesNotDependOnThreads) {
     Engine engine(roof_light_room(0.5f), tregenza(), small_options());
     Condition condition = uniform_sky(2000);
     condition.beams.push_back({glm::normalize(glm::vec3(0.1f, 0.3f, 1)), glm::vec3(50000)});
-    engine.relight(condition);
-    answers.push_back(engine.lighting().node_indirect);
+    answers.push_back(engine.relight(condition)->node_indirect);
   }
   EXPECT_EQ(answers[0], answers[1]);
   EXPECT_EQ(answers[0], answers[2]);
@@ -127,8 +124,8 @@ TEST(Engine, ClosedEmittingBoxIsAFurnace) {
     scene.materials = {{glm::vec3(rho), glm::vec3(100), false, -1}};
     add_box(scene, {0, 0, 0}, {3, 4, 5}, 0, true);
     Engine engine(scene, tregenza(), small_options());
-    engine.relight(uniform_sky(0));
-    const auto e = engine.illuminance({{1, 1, 1}}, {{0, 0, 1}}, kSensorSamples);
+    const auto light = engine.relight(uniform_sky(0));
+    const auto e = illuminance(engine, *light, {{1, 1, 1}}, {{0, 0, 1}}, kSensorSamples);
     EXPECT_NEAR(e[0].indirect.y / (std::numbers::pi * 100 / (1 - rho)), 1, 1e-3) << rho;
   }
 }
@@ -138,14 +135,14 @@ TEST(Frame, ComponentsAddUpAndAFurnaceIsEvenlyBright) {
   scene.materials = {{glm::vec3(0.5f), glm::vec3(100), false, -1}};
   add_box(scene, {0, 0, 0}, {3, 4, 5}, 0, true);
   Engine engine(scene, tregenza(), small_options());
-  engine.relight(uniform_sky(0));
+  const auto light = engine.relight(uniform_sky(0));
   FrameRenderer renderer(engine);
   View view;
   view.position = {0.5, 0.5, 0.5};
   view.target = {3, 4, 4};
   view.width = 32;
   view.height = 24;
-  const Frame frame = renderer.render(view, {});
+  const Frame frame = renderer.render(view, *light, {});
   for (std::size_t p = 0; p < frame.radiance.size(); ++p) {
     EXPECT_NEAR(frame.radiance[p].y, 200, 0.2);
     const glm::vec3 sum = frame.sun[p] + frame.sky[p] + frame.indirect[p] + frame.emitted[p] + frame.exterior[p];
@@ -158,8 +155,8 @@ TEST(Engine, PartitionCastsNoLightThroughItself) {
   SceneGeometry scene = roof_light_room(0.5f);
   test::add_quad(scene, {3.5, 0, 0}, {3.5, 4, 0}, {3.5, 4, 3}, {3.5, 0, 3}, 0);
   Engine engine(scene, tregenza(), small_options());
-  engine.relight(uniform_sky(10000));
-  const auto e = engine.illuminance({{3.75, 2, 0}, {2, 2, 0}}, {{0, 0, 1}, {0, 0, 1}}, kSensorSamples);
+  const auto light = engine.relight(uniform_sky(10000));
+  const auto e = illuminance(engine, *light, {{3.75, 2, 0}, {2, 2, 0}}, {{0, 0, 1}, {0, 0, 1}}, kSensorSamples);
   EXPECT_LT((e[0].sky + e[0].indirect).y, 1e-3f * e[1].sky.y);
 }
 

@@ -87,7 +87,7 @@ TEST(PointLinks, PreparedBeforehandOrWhenNeededIsTheSame) {
   std::vector<int> slots;
   for (int cell = 0; cell < floor.mesh->grid(0).cell_count(); ++cell)
     slots.push_back(floor.mesh->slot_index(0, 0, cell));
-  early.prepare(slots);
+  early.prepare(slots, {});
   EXPECT_GT(early.byte_count(), 0u);
   EXPECT_EQ(floor.by_links(early), floor.by_links(late));
 }

@@ -30,7 +30,9 @@ inline void add_quad(SceneGeometry& scene, glm::dvec3 a, glm::dvec3 b, glm::dvec
   scene.face_material.push_back(material);
 }
 
-inline Material diffuse(float reflectance) { return {glm::vec3(reflectance), glm::vec3(0), false, -1}; }
+inline Material diffuse(float reflectance) {
+  return {glm::vec3(reflectance), glm::vec3(0), false, -1};
+}
 
 /// Tregenza's 145 bins.
 inline SkyBins tregenza() {
@@ -66,6 +68,13 @@ inline SceneGeometry roof_light_room(float reflectance, float transmittance = 1)
   add_quad(scene, {0, y, z}, {0, 0, z}, {a, a, z}, {a, b, z}, 0);
   add_quad(scene, {a, a, z}, {b, a, z}, {b, b, z}, {a, b, z}, 1);
   return scene;
+}
+
+/// Irradiance of points, found in one go.
+inline std::vector<Irradiance> illuminance(const Engine& engine, const Lighting& lighting,
+                                           const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
+                                           GatherSamples samples) {
+  return engine.illuminance(lighting, engine.sensors(points, normals, samples));
 }
 
 }  // namespace transom::test

@@ -8,6 +8,7 @@ import pytest
 from transom.daylight.condition import resolve_condition
 from transom.errors import InputError
 from transom.fenestration.light import panel_light, room_reflectance
+from transom.fenestration.load import load_fenestration
 from transom.fenestration.panels import panel_axes, panel_groups
 from transom.fenestration.reglazing import reglazed
 from transom.scene import content_key, load_scene
@@ -54,9 +55,10 @@ def test_flux_behind_a_panel_is_its_transmittance_of_what_falls_on_it(room: Scen
     (group,) = panel_groups(scene)
     assert condition.sun_direction is not None
     cosine = float(condition.sun_direction @ group.normal)
-    from transom.bsdf.directions import KLEMS_FULL
-
-    residual = float((light.residual_rgb[:, 1] * KLEMS_FULL.projected_solid_angles).sum())
+    product = scene.openings[group.opening].product
+    assert product is not None
+    weights = load_fenestration(product).basis.projected_solid_angles
+    residual = float((light.residual_rgb[:, 1] * weights).sum())
     beams = sum(beam.normal_illuminance_rgb[1] * -(beam.direction @ group.normal) for beam in light.beams)
     assert 0.8 < (residual + beams) / (100_000 * cosine) < 0.92
     assert 0 < room_reflectance(scene.openings[group.opening]) < 0.2

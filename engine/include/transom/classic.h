@@ -64,6 +64,11 @@ class ForwardRays {
   float total_area_ = 0;
 };
 
+/// Where shooting is: light that patches have received, and light that they have yet to pass on [lx, lm/m²].
+struct ShootingState {
+  std::vector<glm::vec3> direct, irradiance, unshot;  ///< irradiance: all of it, direct light included
+};
+
 /// Radiosity by shooting [Cohen, Chen, Wallace & Greenberg 1988]: the patch with most unshot flux gives it to all that
 /// see it, again and again; every state in between is a usable picture. New direct light replaces the old by shooting
 /// the difference, which may be negative [Chen 1990].
@@ -71,27 +76,27 @@ class ProgressiveRadiosity {
  public:
   /// form_factors, through: what each patch sees of the others, directly and through openings.
   ProgressiveRadiosity(const SparseRows& form_factors, const SparseRows& through, std::vector<float> area,
-                       std::vector<glm::vec3> reflectance, const std::vector<glm::vec3>& emitted);
+                       std::vector<glm::vec3> reflectance, std::vector<glm::vec3> emitted);
+
+  /// Darkness in which nothing has been emitted yet.
+  ShootingState dark() const;
 
   /// Replaces the direct illuminance [lx].
-  void replace_direct(const std::vector<glm::vec3>& direct);
+  void replace_direct(ShootingState& state, const std::vector<glm::vec3>& direct) const;
 
   /// Shoots at most `shots` times; stops where the flux in flight is below `tolerance` of all that was ever reflected
   /// or emitted. Returns the number of shots.
-  int shoot(int shots, double tolerance);
+  int shoot(ShootingState& state, int shots, double tolerance) const;
 
   /// Flux in flight as a share of the flux that leaves all patches.
-  double unshot_share() const;
-
-  /// All light that patches receive, direct light included [lx].
-  const std::vector<glm::vec3>& irradiance() const { return irradiance_; }
+  double unshot_share(const ShootingState& state) const;
 
  private:
-  double flux_leaving() const;
+  double flux_leaving(const ShootingState& state) const;
 
   SparseRows seen_by_;  // row i: the patches that see patch i, and how much of them it fills
   std::vector<float> area_;
-  std::vector<glm::vec3> reflectance_, emitted_, direct_, irradiance_, unshot_;
+  std::vector<glm::vec3> reflectance_, emitted_;
 };
 
 }  // namespace transom

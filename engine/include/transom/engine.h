@@ -13,6 +13,7 @@
 #include "transom/geometry.h"
 #include "transom/interreflection.h"
 #include "transom/light_mesh.h"
+#include "transom/lighting.h"
 #include "transom/node_field.h"
 #include "transom/point_links.h"
 #include "transom/ray_scene.h"
@@ -46,8 +47,9 @@ struct SolveFacts {
   float maximum_edge_m = 0;
   double leak_share = 0;  ///< of the hemisphere rays of interior patches, those that met nothing
   TransferDefects defects;
-  int cluster_count = 0;       ///< of patches, for interreflection
-  std::size_t link_bytes = 0;  ///< of what is kept of how nodes see patches
+  int cluster_count = 0;                        ///< of patches, for interreflection
+  std::size_t link_bytes = 0;                   ///< of what is kept of how nodes see patches
+  int kept_patch_rows = 0, kept_node_rows = 0;  ///< taken over from another engine, but for what lies behind openings
 };
 
 /// Flux balance of the interior [lm], linear RGB. Interior: every side that light from the rooms' side of the openings,
@@ -62,56 +64,42 @@ struct EnergyAudit {
   glm::dvec3 in() const { return in_sky + in_beams + in_reflected + in_emitted; }
 };
 
-/// Irradiance split by where it comes from [lx].
-struct Irradiance {
-  glm::vec3 direct{0};    ///< beams and point sources
-  glm::vec3 sky{0};       ///< sky and ground, directly or through openings
-  glm::vec3 indirect{0};  ///< all surfaces: reflected and emitted
-};
-
-/// Light of the present condition.
-struct Lighting {
-  Condition condition;
-  std::vector<glm::vec3> node_sky, node_indirect;  ///< irradiance of each node [lx]
-  std::vector<glm::vec3> patch_irradiance;         ///< all light [lx]
-  std::vector<glm::vec3> patch_smooth_radiosity;   ///< what nodes find by rays: M + rho (E - direct) [lm/m²]
-  std::vector<LitElement> lit_elements;            ///< by beams and point sources
-  std::vector<BrightElement> bright_elements;      ///< what points are connected to
-  std::vector<glm::vec3> patch_sky;                ///< directly from sky and ground [lx]
-  std::vector<glm::vec3> patch_sun;                ///< directly from beams and point sources [lx]
-  int sweeps = 0;                                  ///< cycles of interreflection
-  int shots = 0;                                   ///< kClassic: patches that have shot
-  double unshot_share = 0;                         ///< kClassic: flux in flight, relative
-  int forward_ray_count = 0;                       ///< kClassic
-};
-
 class Engine {
  public:
   /// Solves: everything that depends on geometry and reflectance alone. Throws InputError for a scene that cannot be
   /// lit rightly, such as a room whose wall is open.
   Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions options);
+
+  /// Solves a scene with the options of an engine whose scene was another, and takes over what that found wherever the
+  /// edit leaves it valid: equal bit by bit to a fresh solve whose patches have the same longest edge, and faster.
+  /// Reflectance, luminance: no ray is cast anew. Glazing, or an opening closed: only rays through openings are.
+  /// `solved` is not changed and may go. Throws as above.
+  Engine(const Engine& solved, SceneGeometry scene);
   ~Engine();
 
-  /// Relights for a condition: everything but the image.
-  void relight(Condition condition);
+  /// The light of a condition: everything but the image. Any number of threads may ask at once.
+  /// previous: kClassic alone replaces its light step by step, so that the answer depends on it within the tolerance of
+  /// shooting; null: from darkness.
+  std::shared_ptr<const Lighting> relight(Condition condition, const Lighting* previous = nullptr) const;
 
   /// kClassic: relights step by step. The direct light is that of the new condition at once; `continue_relight` shoots
   /// at most `shots` times, replaces the old condition's indirect light by as much, and says whether more is to come.
   /// Throws InputError for another method.
-  void begin_relight(Condition condition);
-  bool continue_relight(int shots);
+  Lighting begin_relight(Condition condition, const Lighting* previous) const;
+  bool continue_relight(Lighting& lighting, int shots) const;
 
-  /// Irradiance at points (world coordinates [m]) with unit normals, under the present condition. What the last points
-  /// see is kept: asked again under another condition, they cost sums and connections to sunlit patches.
-  std::vector<Irradiance> illuminance(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
-                                      GatherSamples samples);
+  /// What points (world coordinates [m]) with normals see: found once, asked under any light.
+  Sensors sensors(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
+                  GatherSamples samples) const;
 
-  /// Flux balance under the present condition; `rays_per_opening` samples each opening triangle independently.
-  EnergyAudit audit(int rays_per_opening) const;
+  /// Irradiance at sensors: sums, and connections to sunlit patches.
+  std::vector<Irradiance> illuminance(const Lighting& lighting, const Sensors& sensors) const;
+
+  /// Flux balance; `rays_per_opening` samples each opening triangle independently.
+  EnergyAudit audit(const Lighting& lighting, int rays_per_opening) const;
 
   const SolveFacts& facts() const { return facts_; }
-  const Lighting& lighting() const { return lighting_; }
-  Trace& trace() { return trace_; }
+  Trace& trace() const { return trace_; }
 
   // What rendering needs.
   const SceneGeometry& scene() const { return scene_; }
@@ -126,38 +114,69 @@ class Engine {
   /// `shown_radiance`. Empty where the side takes no part.
   NodeShares shown_at(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const;
 
-  /// Radiance reflected by every node, then by every patch, of the present light of sky and of surfaces [cd/m²].
-  void shown_radiance(std::vector<glm::vec4>& sky, std::vector<glm::vec4>& indirect) const;
+  /// Radiance reflected by every node, then by every patch, of the light of sky and of surfaces [cd/m²].
+  void shown_radiance(const Lighting& lighting, std::vector<glm::vec4>& sky, std::vector<glm::vec4>& indirect) const;
 
-  const SparseRows& form_factors() const { return form_factors_; }
+  const SparseRows& form_factors() const { return *form_factors_; }
   const std::vector<float>& patch_areas() const { return patch_area_; }
   const std::vector<int>& patch_slots() const { return slot_of_patch_; }
 
  private:
+  /// What an engine of an earlier state of the scene found, as far as it is valid.
+  struct Known {
+    const Engine* engine = nullptr;
+    bool has_surroundings = false;  // faces and their cells are the same
+    bool has_openings = false;      // and so is all glazing
+    bool has_same_patches = false;  // with the same numbers
+    bool has_same_nodes = false;    // with the same numbers
+    std::vector<int> node;          // its number of each node here, or -1
+  };
+  /// What a patch sees, by slot: without looking through openings; and through them, with all of the sky.
+  struct PatchRow {
+    std::shared_ptr<const GatherRow> around, beyond;
+  };
+  /// What nodes see without looking through openings: patches, and the sky seen by itself.
+  struct NodeRows {
+    SparseRows patches, sky;
+    std::vector<float> exposure;
+  };
+
+  void solve(const Engine* solved);
+  Known known_from(const Engine* solved) const;
   std::vector<int> first_wave() const;
-  void find_patches(std::vector<int> wave, std::vector<GatherRow>& rows);
-  void find_unseen_patches(std::vector<GatherRow>& rows);
+  PatchRow patch_row(int slot, const Known& known) const;
+  void find_patches(std::vector<int> wave, const Known& known);
+  void find_unseen_patches(const Known& known);
   std::vector<int> first_slots() const;
-  void mark_interior(const std::vector<GatherRow>& rows);
-  void check_closed(const std::vector<GatherRow>& rows);
-  void assemble_transfer(std::vector<GatherRow>& rows);
-  std::vector<int> cell_divisions(const std::vector<GatherRow>& rows) const;
-  void gather_nodes(const std::vector<int>& divisions);
+  void mark_interior();
+  void check_closed();
+  void assemble_transfer(const Known& known);
+  std::vector<int> cell_divisions() const;
+  void gather_nodes(Known& known);
+  void find_known_nodes(Known& known) const;
+  std::shared_ptr<const NodeRows> node_rows(const Known& known) const;
+  void look_out_of_nodes(const Known& known);
+  void link_nodes(const Known& known);
+  std::uint32_t node_seed(const Node& node) const;
   void solve_classic();
-  void show_classic();
+  void show_classic(Lighting& lighting) const;
+  std::vector<Share> to_slots(std::vector<Share> elements) const;
+  std::vector<Share> patches_at(const std::vector<Share>& slots) const;
   std::vector<Share> to_patches(const std::vector<Share>& elements) const;
-  glm::vec3 sky_light(const SparseRows& rows, std::size_t row) const;
+  glm::vec3 sky_light(const Condition& condition, const SparseRows& rows, std::size_t row) const;
   void light_always();
   std::vector<int> beam_slots() const;
   std::vector<BrightElement> bright_elements(const std::vector<LitElement>& lit) const;
-  std::vector<glm::vec3> element_direct() const;
+  std::vector<glm::vec3> element_direct(const Lighting& lighting) const;
 
   SceneGeometry scene_;
+  SkyBins sky_bins_;
   SolveOptions options_;
-  Trace trace_;
+  mutable Trace trace_;
   SolveFacts facts_;
   Faces faces_;
   std::unique_ptr<RayScene> rays_;
+  std::vector<float> edges_;  // longest of patches, by face [m]
   std::unique_ptr<LightMesh> mesh_;
   std::unique_ptr<SkyBinIndex> sky_index_;
   std::unique_ptr<Gatherer> gatherer_;
@@ -166,17 +185,22 @@ class Engine {
   // Patches: the slots that take part.
   std::vector<int> patch_of_slot_;  // -1: takes no part
   std::vector<int> slot_of_patch_;
-  std::vector<float> patch_area_;  // exposed part [m²]
+  std::vector<PatchRow> patch_rows_;
+  std::vector<float> patch_area_;     // exposed part [m²]
+  std::vector<float> element_share_;  // of that area: patch * elements_per_slot + element
   std::vector<glm::vec3> patch_reflectance_, patch_emitted_;
   std::vector<char> is_interior_;
-  std::vector<int> unseen_slots_;   // that see patches indoors and were seen by none
-  bool connects_emitters_ = false;  // small emitters: found by connection, not by rays
-  SparseRows form_factors_, through_, patch_sky_;
+  DirectLight::Receivers receivers_;  // all patches
+  std::vector<int> unseen_slots_;     // that see patches indoors and were seen by none
+  bool connects_emitters_ = false;    // small emitters: found by connection, not by rays
+  std::shared_ptr<const SparseRows> form_factors_;
+  SparseRows through_, patch_sky_;
   std::unique_ptr<Interreflection> interreflection_;
 
   // Where light is shown.
   std::unique_ptr<NodeField> nodes_;
-  SparseRows node_sky_, node_patches_;
+  std::shared_ptr<const NodeRows> node_rows_;
+  SparseRows node_sky_, node_through_;  // all of the sky; patches seen through openings
   std::unique_ptr<PointLinks> links_;
 
   // Light that no condition changes: of point sources on elements, and its first reflection, with small emitters, at
@@ -185,23 +209,9 @@ class Engine {
   std::vector<BrightElement> bright_always_;
   std::vector<glm::vec3> node_always_;
 
-  // Points at which illuminance was asked for last.
-  struct Sensors {
-    std::vector<glm::dvec3> points;
-    std::vector<glm::vec3> normals;
-    GatherSamples samples;
-    std::vector<Node> nodes;
-    SparseRows sky, patches;
-  };
-  void gather_sensors(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
-                      GatherSamples samples);
-  Sensors sensors_;
-
   // kClassic alone.
   std::unique_ptr<ForwardRays> forward_rays_;
   std::unique_ptr<ProgressiveRadiosity> shooting_;
-
-  Lighting lighting_;
 };
 
 }  // namespace transom

@@ -46,14 +46,14 @@ PrimaryHits trace_primary(const SceneGeometry& scene, const View& view);
 class ShadowVolumes;
 class GlContext;
 
-/// Renders the present lighting of an engine. What the last camera saw is kept: further pictures of it, under any
+/// Renders what an engine has lit. What the last camera saw is kept: further pictures of it, under any
 /// light, cost beams and sums. Holds the GL context of the stencil method, made on first use; one thread.
 class FrameRenderer {
  public:
-  explicit FrameRenderer(Engine& engine);
+  explicit FrameRenderer(const Engine& engine);
   ~FrameRenderer();
 
-  Frame render(const View& view, FrameOptions options);
+  Frame render(const View& view, const Lighting& lighting, FrameOptions options);
 
  private:
   class Masks;
@@ -61,14 +61,14 @@ class FrameRenderer {
     int opening;
     glm::vec3 normal;
   };
-  void render_masks(const View& view, Masks& masks);
-  void add_smooth_light(const ViewSamples& samples, bool components, Frame& frame) const;
+  void render_masks(const View& view, const std::vector<Beam>& beams, Masks& masks);
+  void add_smooth_light(const ViewSamples& samples, const Lighting& lighting, bool components, Frame& frame) const;
   void add_beam(const ViewSamples& samples, const Beam& beam, const std::vector<float>* mask_share, const Masks& masks,
                 std::vector<glm::vec3>& picture, std::vector<char>& is_edge) const;
   void find_shares(const Beam& beam, std::span<const BeamPoint> points, const std::vector<float>* mask_share,
                    const Masks& masks, std::span<float> shares) const;
 
-  Engine& engine_;
+  const Engine& engine_;
   std::unique_ptr<ViewSamples> samples_;  // of the last camera
   std::unique_ptr<GlContext> context_;
   std::unique_ptr<ShadowVolumes> volumes_;

@@ -46,11 +46,18 @@ class Gatherer {
   Gatherer(const LightMesh& mesh, const RayScene& rays, const std::vector<Material>& materials,
            const std::vector<OpeningGroup>& openings, const SkyBinIndex& sky);
 
-  /// Irradiance at a point [Cohen & Wallace 1993, eq. 2.54].
-  GatherRow gather_at_point(const Node& point, GatherSamples samples, std::uint32_t seed) const;
+  /// What is seen without looking through an opening: `reached`, `escaped`, `exposure`, `harmonic_distance`, and the
+  /// sky seen by itself. No glazing changes it.
+  GatherRow surroundings_of_point(const Node& point, GatherSamples samples, std::uint32_t seed) const;
+  /// Of a patch: means over its exposed part.
+  GatherRow surroundings_of_patch(int slot, GatherSamples samples, std::uint32_t seed) const;
 
-  /// Mean irradiance over the exposed part of a patch.
-  GatherRow gather_over_patch(int slot, GatherSamples samples, std::uint32_t seed) const;
+  /// Adds what is seen through openings, `through` and `sky`, to a row of which the exposure is known.
+  void look_through_openings(const Node& point, GatherSamples samples, std::uint32_t seed, GatherRow& row) const;
+  void look_through_openings(int slot, GatherSamples samples, std::uint32_t seed, GatherRow& row) const;
+
+  /// Irradiance at a point [Cohen & Wallace 1993, eq. 2.54]: surroundings, and through openings.
+  GatherRow gather_at_point(const Node& point, GatherSamples samples, std::uint32_t seed) const;
 
  private:
   struct OpeningTriangle {
@@ -61,6 +68,7 @@ class Gatherer {
   struct Origin {
     glm::vec3 position, normal;
   };
+  auto places_on(int slot_index) const;
   template <typename OriginOf>
   void gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, GatherRow& row) const;
   template <typename OriginOf>

@@ -27,6 +27,8 @@ struct Grid {
   int u_count = 1;
   int v_count = 1;
 
+  bool operator==(const Grid&) const = default;
+
   int cell_count() const { return is_quad ? u_count * v_count : u_count * u_count; }
   int node_count() const { return is_quad ? (u_count + 1) * (v_count + 1) : (u_count + 1) * (u_count + 2) / 2; }
 

@@ -20,6 +20,8 @@ struct Slot {
 struct Node {
   glm::vec3 position{0};  ///< lifted off its surface by Faces::ray_offset
   glm::vec3 normal{0};    ///< unit; on a surface the shading normal of its side
+
+  bool operator==(const Node&) const = default;
 };
 
 /// Grids over all faces: cells no longer than the face's maximum edge, each split into elements_per_edge^2 elements.
@@ -28,6 +30,10 @@ class LightMesh {
   LightMesh(const Faces& faces, const std::vector<float>& maximum_edges, int elements_per_edge);
 
   const Faces& faces() const { return *faces_; }
+  /// Whether each of the other's faces has a cell where this one's has: their slots are then the same.
+  bool has_same_cells(const LightMesh& other) const {
+    return elements_per_edge_ == other.elements_per_edge_ && grids_ == other.grids_;
+  }
   int slot_count() const { return 2 * first_cell_.back(); }
   int elements_per_slot() const { return elements_per_edge_ * elements_per_edge_; }
   const Grid& grid(int face) const { return grids_[static_cast<std::size_t>(face)]; }

@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <memory>
+#include <mutex>
 #include <vector>
 
 #include "transom/first_bounce.h"
@@ -20,44 +22,64 @@ class PointLinks {
  public:
   PointLinks(const LightMesh& mesh, const RayScene& rays, const std::vector<Node>& points);
 
-  /// Links the patches of these slots to all points, as far as memory allows.
-  void prepare(const std::vector<int>& slots);
+  /// What has been linked in the same places.
+  struct Known {
+    const PointLinks* links = nullptr;
+    std::vector<int> point;         ///< its number of each point here, or -1
+    bool has_same_points = false;   ///< all of them, in the same order
+    bool has_same_glazing = false;  ///< else only what is seen without looking through an opening is of use
+  };
+
+  /// Links the patches of these slots to all points, as far as memory allows. known: what need not be found again.
+  void prepare(const std::vector<int>& slots, const Known& known) const;
 
   /// Adds to the irradiance of every point [lx] what the bright elements send to it; elements of one slot stand
-  /// together. Links what has not been linked.
-  void add_irradiance(const std::vector<BrightElement>& bright, std::vector<glm::vec3>& irradiance);
+  /// together. Links what has not been linked. Threads may ask at once.
+  void add_irradiance(const std::vector<BrightElement>& bright, std::vector<glm::vec3>& irradiance) const;
 
   /// Memory held by links [bytes].
-  std::size_t byte_count() const { return byte_count_; }
+  std::size_t byte_count() const;
 
  private:
   static constexpr std::size_t kBlock = 64;  // points
   /// What one patch is to all points. A seen share T is stored as 255 sqrt(T): 1 is exact, dark glass keeps its digits.
   struct Link {
-    bool is_ready = false;
     std::vector<int> block;          // blocks of points in front of the patch, ascending
     std::vector<std::uint8_t> seen;  // kBlock for each of them: of far points; 0 for near ones
     std::vector<int> near_point;     // ascending
     std::vector<float> near_weight;  // for each near point, by element: irradiance per radiosity
+    std::vector<int> glazed_point;   // ascending: points between which and the patch some opening stands
+    std::uint8_t seen_of(int point) const;
+    const float* near_weight_of(int point, std::size_t element_count) const;  // null: not among the near points
+  };
+  struct KnownPoints {
+    const Link* link;  // null: none is known
+    const Known& known;
+    int number(int point) const;  // -1: to be found anew
   };
   struct LitPatch {
-    const Link* link;
+    std::shared_ptr<const Link> link;
     std::size_t first_bright, last_bright;
     glm::vec3 centroid, normal;  // of the light
     glm::vec3 flux;              // reflected [lm], over pi
   };
+  std::size_t bytes_of(const Link& link) const;
   glm::vec3 exposed_middle(int slot, glm::vec3 normal) const;
-  void link(int slot);
-  void link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points) const;
-  void link_near(Link& link, int slot, glm::vec3 normal) const;
+  std::vector<std::shared_ptr<const Link>> links_of(const std::vector<int>& slots, const Known& known) const;
+  std::shared_ptr<const Link> link(int slot, const Known& known) const;
+  void link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points, const KnownPoints& known) const;
+  void link_near(Link& link, int slot, glm::vec3 normal, const KnownPoints& known) const;
   LitPatch lit_patch(const std::vector<BrightElement>& bright, std::size_t first, std::size_t last) const;
 
   const LightMesh& mesh_;
   const RayScene& rays_;
   std::size_t point_count_;
   std::vector<float> x_, y_, z_, nx_, ny_, nz_;  // of the points, padded to whole blocks
-  std::vector<Link> links_;                      // by slot
-  std::size_t byte_count_ = 0;
+
+  // What has been found is kept. It changes no answer, only what the next one costs.
+  mutable std::mutex mutex_;
+  mutable std::vector<std::shared_ptr<const Link>> links_;  // by slot
+  mutable std::size_t byte_count_ = 0;
 };
 
 }  // namespace transom

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -14,20 +15,31 @@ struct TraceEvent {
   double end_s = 0;
 };
 
-/// A list of phases. One thread at a time may record: phases are the sequential steps of the engine.
+/// A list of phases. Threads may record at once; phases are the sequential steps of each.
 class Trace {
  public:
   void enable(bool on) { enabled_ = on; }
   bool enabled() const { return enabled_; }
-  void clear() { events_.clear(); }
-  const std::vector<TraceEvent>& events() const { return events_; }
+  void clear() {
+    const std::lock_guard lock(mutex_);
+    events_.clear();
+  }
+  std::vector<TraceEvent> events() const {
+    const std::lock_guard lock(mutex_);
+    return events_;
+  }
 
   double now_s() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
-  void record(const char* name, double begin_s) { events_.push_back({name, begin_s, now_s()}); }
+  void record(const char* name, double begin_s) {
+    const double end_s = now_s();
+    const std::lock_guard lock(mutex_);
+    events_.push_back({name, begin_s, end_s});
+  }
 
  private:
   using Clock = std::chrono::steady_clock;
   Clock::time_point start_ = Clock::now();
+  mutable std::mutex mutex_;
   std::vector<TraceEvent> events_;
   bool enabled_ = false;
 };

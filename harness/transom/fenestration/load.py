@@ -14,8 +14,8 @@ from transom.bsdf.bsdf import Bsdf, Path
 from transom.bsdf.directions import KLEMS_FULL, AngleBasis
 from transom.fenestration.choice import is_file
 from transom.fenestration.through import Fenestration, SunThrough
+from transom.fenestration.traced import TracedFenestration
 from transom.products import load_product
-from transom.products.goniophotometer import measure
 from transom.scene.model import ProductChoice
 
 Float64 = NDArray[np.float64]
@@ -54,4 +54,4 @@ def load_fenestration(choice: ProductChoice) -> Fenestration:
     if is_file(choice.name):
         return TabulatedFenestration(read_bsdf(FilePath(choice.name)))
     product = load_product(choice.name).with_parameters(dict(choice.parameters))
-    return TabulatedFenestration(measure(product).bsdf)
+    return TracedFenestration(product.section())

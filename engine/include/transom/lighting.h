@@ -1,0 +1,55 @@
+/// @file The light of one condition, and what sensors receive of it.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "transom/classic.h"
+#include "transom/deposit.h"
+#include "transom/first_bounce.h"
+#include "transom/gather.h"
+#include "transom/light_mesh.h"
+#include "transom/sky.h"
+#include "transom/transfer.h"
+
+namespace transom {
+
+/// Irradiance split by where it comes from [lx].
+struct Irradiance {
+  glm::vec3 direct{0};    ///< beams and point sources
+  glm::vec3 sky{0};       ///< sky and ground, directly or through openings
+  glm::vec3 indirect{0};  ///< all surfaces: reflected and emitted
+};
+
+/// Light of a condition, as Engine::relight found it. Shown, measured and kept as it is; never changed.
+struct Lighting {
+  Condition condition;
+  std::vector<glm::vec3> node_sky, node_indirect;  ///< irradiance of each node [lx]
+  std::vector<glm::vec3> patch_irradiance;         ///< all light [lx]
+  std::vector<glm::vec3> patch_smooth_radiosity;   ///< what nodes find by rays: M + rho (E - direct) [lm/m²]
+  std::vector<LitElement> lit_elements;            ///< by beams and point sources
+  std::vector<BrightElement> bright_elements;      ///< what points are connected to
+  std::vector<glm::vec3> patch_sky;                ///< directly from sky and ground [lx]
+  std::vector<glm::vec3> patch_sun;                ///< directly from beams and point sources [lx]
+  int sweeps = 0;                                  ///< cycles of interreflection
+  int shots = 0;                                   ///< kClassic: patches that have shot
+  double unshot_share = 0;                         ///< kClassic: flux in flight, relative
+  ShootingState shooting;                          ///< kClassic: where the next relighting may begin
+  int forward_ray_count = 0;                       ///< kClassic
+};
+
+/// Points at which illuminance is asked for, and what they see.
+struct Sensors {
+  std::vector<glm::dvec3> points;  ///< world [m]
+  std::vector<glm::vec3> normals;
+  GatherSamples samples;
+  std::vector<Node> nodes;
+  SparseRows sky, patches;  ///< weights of sky bins and of patches
+
+  /// Whether these are the sensors that were asked for.
+  bool are(const std::vector<glm::dvec3>& p, const std::vector<glm::vec3>& n, GatherSamples s) const {
+    return points == p && normals == n && samples == s;
+  }
+};
+
+}  // namespace transom
