@@ -159,7 +159,7 @@ def target_sensors(scene: Scene) -> tuple[SensorSet, ...]:
 
 def with_glazing(engine: Engine, scene: Scene) -> Engine:
     """The engine for a scene that differs from its own in glazing alone."""
-    return engine if engine.scene is scene else Engine.solve(scene, engine.options)
+    return engine if engine.scene is scene else engine.edited(scene)
 
 
 def csv_text(plot: Plot) -> str:

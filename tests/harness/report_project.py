@@ -129,6 +129,7 @@ def make_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sky: str = "ov
         monkeypatch.setattr(f"transom.{module}.load_renderer", renderers.__getitem__)
     for module in ("run", "visible", "report.viewer"):
         monkeypatch.setattr(f"transom.{module}.first_surfaces", surfaces)
+    monkeypatch.setattr("transom.report.build.make_plots", lambda *_: None)
     timings = [
         Timing("small", "solve", "s", 1.0, 0.9, 1.1, 3, 2, 40),
         Timing("small", "relight", "s", 2e-3, 1e-3, 3e-3, 9, 2, 40),

@@ -19,6 +19,7 @@ from transom.report.junit import junit_xml
 from transom.report.notes import read_notes
 from transom.report.page import write_page
 from transom.report.pdf import write_pdf
+from transom.report.plots import make_plots
 from transom.report.results import collect_results, write_results
 from transom.report.sections import hour_grids, rooms, shows_views, strips, view_images
 from transom.report.speed import read_speed
@@ -53,6 +54,7 @@ def write_report(output: Path, build: Path, *, render: bool = True) -> int:
     cases = day_cases([suite for suite in suites if shows_views(suite)])
     if render:
         render_missing([*figure_13_cases(suites), *cases], note)
+        make_plots(build, note)
     pictures = Pictures(
         rooms=[room for suite in suites if shows_views(suite) for room in rooms(suite)],
         hours=[grid for suite in suites if suite.layout == "hours" for grid in hour_grids(suite, results)],
@@ -60,7 +62,7 @@ def write_report(output: Path, build: Path, *, render: bool = True) -> int:
         day=find_day(cases),
         figure_13=figure_13_strips(suites),
         corners=list(corner_errors(suites)),
-        fenestration=make_chapter(suites, results),
+        fenestration=make_chapter(suites, results, build),
     )
     speed = read_speed(build, _judged_scenes(suites))
     images, checked = view_images(suites, results), read_check(build / "check" / "check.json")

@@ -121,6 +121,7 @@ def make_content(
     absent = [Absence(table.title, table.command) for table in tables if not table.rows and table.command]
     if not pictures.figure_13:
         absent.append(Absence("Figure 13 of the paper", "transom run crosscheck"))
+    absent += [Absence(order.caption, order.command) for order, plot in pictures.fenestration.plots if plot is None]
     if pictures.day is None:
         absent.append(Absence("A day relit", REPRODUCE))
     absent += [

@@ -15,6 +15,7 @@ from transom.fenestration.panels import panel_axes
 from transom.products import load_product
 from transom.report.numbers import fixed, words
 from transom.report.pictures import Picture, find_pictures, illustration
+from transom.report.plots import PlotOrder, find_plots
 from transom.report.results import Results
 from transom.report.rows_fenestration import WRITTEN, glazing_words, transport, written_table
 from transom.report.rows_fenestration import speed as speed_rows
@@ -87,20 +88,23 @@ class PrismFigure:
 
 @dataclass(frozen=True)
 class Chapter:
-    """Everything of the chapter but its tables. rooms: a viewer for each product that has a reference."""
+    """Everything of the chapter but its tables. rooms: a viewer for each product that has a reference. plots: those of
+    transom.report.plots, None where there is none."""
 
     galleries: list[Gallery]
     rooms: list[RoomSection]
     prism: PrismFigure
+    plots: list[tuple[PlotOrder, Picture | None]]
 
 
-def make_chapter(suites: Sequence[Suite], results: Results) -> Chapter:
+def make_chapter(suites: Sequence[Suite], results: Results, build: Path) -> Chapter:
     """From the runs of the suite that are there."""
     chosen = [suite for suite in suites if suite.name == FENESTRATION]
     return Chapter(
         galleries=[gallery for suite in chosen for gallery in galleries(suite, results)],
         rooms=[room for suite in chosen for room in rooms(suite)],
         prism=prism_figure(),
+        plots=find_plots(build),
     )
 
 

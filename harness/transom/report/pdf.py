@@ -109,6 +109,7 @@ def _record(content: Content, folder: Path) -> dict[str, Any]:
             for view in room.views
             if view.viewer
         ],
+        "plots": [_picture(plot, folder) for _, plot in content.pictures.fenestration.plots if plot],
         "galleries": [
             {
                 "title": gallery.title,
