@@ -43,6 +43,10 @@ nb::ndarray<nb::numpy, float> picture(std::vector<glm::vec3>&& pixels, int width
   return to_array<float>(std::move(pixels), {static_cast<std::size_t>(height), static_cast<std::size_t>(width), 3});
 }
 
+glm::vec3 vector_of(std::tuple<float, float, float> v) {
+  return {std::get<0>(v), std::get<1>(v), std::get<2>(v)};
+}
+
 // The engine with its present light, the renderer that looks at it, and the sensors that were asked last.
 struct Session {
   Engine engine;
@@ -123,6 +127,17 @@ NB_MODULE(_engine, m) {
           },
           "transmittance"_a, "diffuse_reflectance"_a)
       .def(
+          "add_panels",
+          [](SceneGeometry& s, In<float, nb::shape<3, 3>> axes, In<float, nb::ndim<1>> polar_edges,
+             In<int, nb::ndim<1>> counts) {
+            const std::vector<glm::vec3> rows = to_vector<glm::vec3>(axes);
+            s.openings.push_back({std::vector<float>(2, 0.f), 0.f,
+                                  PanelFrame{rows[0], rows[1], rows[2],
+                                             AngleBins(to_vector<float>(polar_edges), to_vector<int>(counts))}});
+          },
+          "axes"_a, "polar_edges"_a, "counts"_a,
+          "An opening group that holds a product; rows x, y, z of its frame in the world, bins of its directions.")
+      .def(
           "add_point_source",
           [](SceneGeometry& s, std::tuple<double, double, double> position, std::tuple<float, float, float> intensity) {
             const auto [x, y, z] = position;
@@ -154,6 +169,7 @@ NB_MODULE(_engine, m) {
       .def_rw("elements_per_edge", &SolveOptions::elements_per_edge)
       .def_rw("patch_samples", &SolveOptions::patch_samples)
       .def_rw("node_samples", &SolveOptions::node_samples)
+      .def_rw("panel_rays", &SolveOptions::panel_rays)
       .def_rw("node_spacing", &SolveOptions::node_spacing)
       .def_rw("tolerance", &SolveOptions::tolerance)
       .def_rw("seed", &SolveOptions::seed)
@@ -177,7 +193,9 @@ NB_MODULE(_engine, m) {
       .def_ro("cluster_count", &SolveFacts::cluster_count)
       .def_ro("link_bytes", &SolveFacts::link_bytes)
       .def_ro("kept_patch_rows", &SolveFacts::kept_patch_rows)
-      .def_ro("kept_node_rows", &SolveFacts::kept_node_rows);
+      .def_ro("kept_node_rows", &SolveFacts::kept_node_rows)
+      .def_ro("panel_count", &SolveFacts::panel_count)
+      .def_ro("panel_bin_count", &SolveFacts::panel_bin_count);
 
   nb::class_<Condition>(m, "Condition")
       .def(
@@ -202,7 +220,22 @@ NB_MODULE(_engine, m) {
             const auto [r, g, b] = illuminance;
             c.beams.push_back({{x, y, z}, {r, g, b}});
           },
-          "direction_to_source"_a, "normal_illuminance"_a);
+          "direction_to_source"_a, "normal_illuminance"_a)
+      .def(
+          "add_lobe",
+          [](Condition& c, int opening, std::tuple<float, float, float> direction,
+             std::tuple<float, float, float> illuminance, std::tuple<float, float, float> sun) {
+            c.beams.push_back({vector_of(direction), vector_of(illuminance), opening, vector_of(sun)});
+          },
+          "opening"_a, "direction_to_source"_a, "normal_illuminance"_a, "direction_to_sun"_a,
+          "Parallel light behind the panels of an opening group that the sun reaches.")
+      .def(
+          "add_residual",
+          [](Condition& c, int opening, In<float, nb::shape<-1, 3>> radiance, std::tuple<float, float, float> sun) {
+            c.residuals.push_back({opening, vector_of(sun), to_vector<glm::vec3>(radiance)});
+          },
+          "opening"_a, "radiance"_a, "direction_to_sun"_a,
+          "Radiance of panels in full sun by exit bin [cd/m²]: the sun's light that lobes leave.");
 
   nb::class_<View>(m, "View").def(
       "__init__",
@@ -234,6 +267,13 @@ NB_MODULE(_engine, m) {
       .def(nb::init<const Session&, SceneGeometry>(), "solved"_a, "scene"_a, nb::call_guard<nb::gil_scoped_release>(),
            "Solves an edited scene, and takes over what is still valid: equal to solving it afresh.")
       .def_prop_ro("facts", [](const Session& s) { return s.engine.facts(); })
+      .def(
+          "set_product",
+          [](Session& s, int opening, In<float, nb::shape<-1, -1>> transmission, float room_reflectance) {
+            s.engine.set_product(opening, {to_vector<float>(transmission), room_reflectance});
+          },
+          "opening"_a, "transmission"_a, "room_reflectance"_a,
+          "BTDF by bins [1/sr], row = exit bin, and room reflectance of an opening group's panels.")
       .def(
           "relight", [](Session& s, const Condition& c) { s.present = s.engine.relight(c, s.previous()); },
           "condition"_a, nb::call_guard<nb::gil_scoped_release>())

@@ -12,8 +12,8 @@ constexpr double kShootingTolerance = 1e-3;  // flux in flight at which shooting
 }  // namespace
 
 void Engine::solve_classic() {
-  forward_rays_ = std::make_unique<ForwardRays>(*mesh_, *rays_, scene_.materials, scene_.openings, ForwardRayCounts{},
-                                                hash_seed(options_.seed, kForwardStream));
+  forward_rays_ = std::make_unique<ForwardRays>(*mesh_, *rays_, scene_.materials, scene_.openings, *panels_,
+                                                ForwardRayCounts{}, hash_seed(options_.seed, kForwardStream));
   shooting_ =
       std::make_unique<ProgressiveRadiosity>(*form_factors_, through_, patch_area_, patch_reflectance_, patch_emitted_);
   connects_emitters_ = false;
@@ -28,16 +28,17 @@ Lighting Engine::begin_relight(Condition condition, const Lighting* previous) co
   const int per_slot = mesh_->elements_per_slot();
   {
     const TracePhase phase(trace_, "forward rays");
-    ForwardLight light = forward_rays_->cast(lighting.condition, *sky_index_, patch_of_slot_, patch_area_);
-    lighting.patch_sun = std::move(light.sun);
-    lighting.patch_sky = std::move(light.sky);
-    lighting.forward_ray_count = light.ray_count;
+    std::vector<glm::vec3> residual;
+    find_shafts(lighting.condition, residual);
+    lighting.patch_sun.assign(n, glm::vec3(0));
+    lighting.patch_sky.assign(n, glm::vec3(0));
+    lighting.panel_radiance.assign(residual.size(), glm::vec3(0));
     // What lies outdoors is lit without an opening; point sources light everything.
     std::vector<int> outdoors;
     for (std::size_t p = 0; p < n; ++p)
       if (!is_interior_[p]) {
         outdoors.push_back(slot_of_patch_[p]);
-        lighting.patch_sky[p] = sky_light(lighting.condition, patch_sky_, p);
+        lighting.patch_sky[p] = sky_light(lighting, patch_sky_, p);
       }
     const std::vector<Beam>& beams = lighting.condition.beams;
     std::vector<LitElement> lit =
@@ -53,6 +54,20 @@ Lighting Engine::begin_relight(Condition condition, const Lighting* previous) co
     for (const LitElement& e : lit) {
       const int patch = patch_of_slot_[e.element / per_slot];
       lighting.patch_sun[patch] += e.illuminance * element_share_[patch * per_slot + e.element % per_slot];
+    }
+    // Panels pass on what surfaces outdoors reflect of their direct light.
+    std::vector<glm::vec3> radiosity(n, glm::vec3(0));
+    for (const int slot : outdoors) {
+      const auto p = static_cast<std::size_t>(patch_of_slot_[slot]);
+      radiosity[p] = patch_emitted_[p] + patch_reflectance_[p] * (lighting.patch_sky[p] + lighting.patch_sun[p]);
+    }
+    find_panel_radiance(residual, radiosity, lighting);
+    const ForwardLight light =
+        forward_rays_->cast(lighting.condition, lighting.panel_radiance, *sky_index_, patch_of_slot_, patch_area_);
+    lighting.forward_ray_count = light.ray_count;
+    for (std::size_t p = 0; p < n; ++p) {
+      lighting.patch_sun[p] += light.sun[p];
+      if (is_interior_[p]) lighting.patch_sky[p] += light.sky[p];
     }
   }
   std::vector<glm::vec3> direct(n);

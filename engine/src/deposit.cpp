@@ -73,10 +73,14 @@ DirectLight::DirectLight(const LightMesh& mesh, const RayScene& rays, const std:
     sources_.push_back({glm::vec3(source.position - mesh.faces().origin), source.intensity});
 }
 
-void DirectLight::beam_transmission(glm::vec3 direction, std::span<const glm::vec3> points,
+void DirectLight::beam_transmission(const Beam& beam, std::span<const glm::vec3> points,
                                     std::span<float> share) const {
+  if (beam.opening >= 0) {
+    shaft_transmission(beam, points, share);
+    return;
+  }
   std::vector<Ray> rays(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) rays[i] = {points[i], direction};
+  for (std::size_t i = 0; i < points.size(); ++i) rays[i] = {points[i], beam.direction_to_source};
   std::vector<std::uint8_t> blocked(points.size());
   rays_.occluded(RayScene::What::kOpaque, rays, blocked, RayScene::Order::kCoherent);
   std::vector<Ray> free_rays;
@@ -107,7 +111,7 @@ glm::vec3 DirectLight::illuminance(const std::vector<Beam>& beams, glm::vec3 poi
     const float cosine = glm::dot(beam.direction_to_source, normal);
     if (cosine <= 0) continue;
     float share = 0;
-    beam_transmission(beam.direction_to_source, {&point, 1}, {&share, 1});
+    beam_transmission(beam, {&point, 1}, {&share, 1});
     sum += beam.normal_illuminance * (cosine * share);
   }
   return sum;
@@ -156,15 +160,15 @@ bool DirectLight::is_partly_lit(int slot_index, int element, std::span<const flo
 
 // Mean share of a beam on each element of a slot. Few samples tell elements that are wholly lit or dark from those at
 // the edges of light, which are sampled densely.
-void DirectLight::beam_on_slot(glm::vec3 direction, int slot_index, const Corners& corners, const Patterns& patterns,
-                               std::vector<float>& mean) const {
+void DirectLight::sun_on_slot(const Beam& sun, int slot_index, const Corners& corners, const Patterns& patterns,
+                              std::vector<float>& mean) const {
   const int element_count = mesh_.elements_per_slot();
   std::vector<int> elements(static_cast<std::size_t>(element_count));
   std::iota(elements.begin(), elements.end(), 0);
   std::vector<float> share(static_cast<std::size_t>(element_count * kSamplesPerElement));
   std::vector<glm::vec3> points = points_on(slot_index, corners, elements, kSamplesPerElement, patterns);
-  beam_transmission(direction, points, share);
-  ignore_small_openings(direction, points, share);
+  beam_transmission(sun, points, share);
+  ignore_small_openings(sun.direction_to_source, points, share);
   mean.resize(static_cast<std::size_t>(element_count));
   for (int e = 0; e < element_count; ++e)
     mean[e] = std::accumulate(&share[e * kSamplesPerElement + kTellingSamples],
@@ -174,8 +178,8 @@ void DirectLight::beam_on_slot(glm::vec3 direction, int slot_index, const Corner
   if (elements.empty()) return;
   std::vector<float> refined(elements.size() * kRefinedSamplesPerElement);
   points = points_on(slot_index, corners, elements, kRefinedSamplesPerElement, patterns);
-  beam_transmission(direction, points, refined);
-  ignore_small_openings(direction, points, refined);
+  beam_transmission(sun, points, refined);
+  ignore_small_openings(sun.direction_to_source, points, refined);
   for (std::size_t k = 0; k < elements.size(); ++k)
     mean[elements[k]] = std::accumulate(&refined[k * kRefinedSamplesPerElement],
                                         &refined[k * kRefinedSamplesPerElement] + kRefinedSamplesPerElement, 0.f) /
@@ -196,6 +200,10 @@ std::vector<std::vector<char>> DirectLight::reach(const std::vector<Beam>& beams
   std::vector<std::vector<char>> reached(beams.size(), std::vector<char>(receivers.slots.size(), 0));
   for (std::size_t b = 0; b < beams.size(); ++b) {
     if (beams[b].normal_illuminance == glm::vec3(0)) continue;
+    if (beams[b].opening >= 0) {
+      reached[b] = reach_of_lobe(beams[b], receivers);
+      continue;
+    }
     const glm::vec3 direction = beams[b].direction_to_source;
     const BeamOutlines outlines(mesh_.faces(), large_openings_, direction);
     int known_face = -1;
@@ -244,6 +252,7 @@ std::map<int, glm::vec3> DirectLight::send_through_small_openings(const std::vec
   std::vector<Hit> hits(kRaysPerSmallOpening);
   for (const int f : small_openings_)
     for (const Beam& beam : beams) {
+      if (beam.opening >= 0) continue;
       const Face& face = mesh_.faces().faces[f];
       const float cosine = glm::dot(face.normal, beam.direction_to_source);
       if (std::abs(cosine) < kGrazingCosine) continue;
@@ -255,7 +264,7 @@ std::map<int, glm::vec3> DirectLight::send_through_small_openings(const std::vec
         places[i] = face.position(face.is_quad ? u : sample_triangle(u)) + beyond;
         onwards[i] = {places[i], -beam.direction_to_source};
       }
-      beam_transmission(beam.direction_to_source, places, share);
+      beam_transmission(beam, places, share);
       rays_.intersect(RayScene::What::kAll, onwards, hits);
       const float flux_share = face.area * std::abs(cosine) / static_cast<float>(kRaysPerSmallOpening);
       for (std::size_t i = 0; i < hits.size(); ++i) {
@@ -297,7 +306,10 @@ std::vector<LitElement> DirectLight::deposit(const std::vector<Beam>& beams, con
     for (std::size_t b = 0; b < beams.size(); ++b) {
       if (!reached[b][candidates[k]]) continue;
       const float cosine = glm::dot(beams[b].direction_to_source, normal);
-      beam_on_slot(beams[b].direction_to_source, slot_index, corners, patterns, mean);
+      if (beams[b].opening < 0)
+        sun_on_slot(beams[b], slot_index, corners, patterns, mean);
+      else
+        lobe_on_slot(beams[b], slot_index, seed, mean);
       for (int e = 0; e < per_slot; ++e) sum[k][e] += beams[b].normal_illuminance * (cosine * mean[e]);
     }
     if (!sources_.empty()) sources_on_slot(slot_index, corners, normal, patterns, sum[k]);

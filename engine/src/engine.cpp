@@ -50,7 +50,8 @@ void Engine::solve(const Engine* solved) {
                  : choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
     facts_.maximum_edge_m = *std::min_element(edges_.begin(), edges_.end());
     mesh_ = std::make_unique<LightMesh>(faces_, edges_, options_.elements_per_edge);
-    gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_);
+    panels_ = std::make_unique<Panels>(faces_, scene_.materials, scene_.openings);
+    gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_, *panels_);
     const float element_edge = facts_.maximum_edge_m / static_cast<float>(options_.elements_per_edge);
     direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources, scene_.materials,
                                                   element_edge * element_edge);
@@ -61,6 +62,7 @@ void Engine::solve(const Engine* solved) {
   {
     const TracePhase phase(trace_, "patches");
     patch_of_slot_.assign(static_cast<std::size_t>(mesh_->slot_count()), -1);
+    gather_panels();
     find_patches(first_wave(), known);
     mark_interior();
     find_unseen_patches(known);
@@ -70,6 +72,7 @@ void Engine::solve(const Engine* solved) {
   {
     const TracePhase phase(trace_, "transfer");
     assemble_transfer(known);
+    link_panels();
   }
   if (options_.method == Method::kClassic) {
     const TracePhase phase(trace_, "forward rays");
@@ -98,7 +101,8 @@ Engine::Known Engine::known_from(const Engine* solved) const {
               other = solved->scene_.materials[solved->faces_.faces[f].material].opening;
     known.has_openings =
         own < 0 ? other < 0
-                : other >= 0 && scene_.openings[own].transmittance == solved->scene_.openings[other].transmittance;
+                : other >= 0 && scene_.openings[own].transmittance == solved->scene_.openings[other].transmittance &&
+                      scene_.openings[own].panel == solved->scene_.openings[other].panel;
   }
   return known;
 }

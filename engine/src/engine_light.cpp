@@ -16,7 +16,8 @@ constexpr int kShotsAtOnce = 1 << 20;
 
 }  // namespace
 
-glm::vec3 Engine::sky_light(const Condition& condition, const SparseRows& rows, std::size_t row) const {
+glm::vec3 Engine::sky_light(const Lighting& lighting, const SparseRows& rows, std::size_t row) const {
+  const Condition& condition = lighting.condition;
   const int ground = sky_index_->count() - 1;
   float sky = 0;
   glm::vec3 sum(0);
@@ -24,8 +25,10 @@ glm::vec3 Engine::sky_light(const Condition& condition, const SparseRows& rows, 
     const Share& share = rows.entries[k];
     if (share.index == ground)
       sum += share.weight * condition.ground_luminance;
-    else
+    else if (share.index < ground)
       sky += share.weight * condition.sky_luminance[share.index];
+    else
+      sum += share.weight * lighting.panel_radiance[share.index - ground - 1];
   }
   return sum + sky * condition.sky_colour;
 }
@@ -51,6 +54,8 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
   const auto result = std::make_shared<Lighting>();
   Lighting& lighting = *result;
   lighting.condition = std::move(condition);
+  std::vector<glm::vec3> residual;
+  find_shafts(lighting.condition, residual);
   const std::size_t n = slot_of_patch_.size();
   const int per_slot = mesh_->elements_per_slot();
   std::vector<LitElement>& lit = lighting.lit_elements;
@@ -59,13 +64,8 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
     lit = beam_light_->deposit(lighting.condition.beams, receivers_, hash_seed(options_.seed, kBeamStream));
     lighting.bright_elements = bright_elements(lit);
   }
-  std::vector<glm::vec3>&sky = lighting.patch_sky, &sun = lighting.patch_sun;
-  sky.resize(n);
+  std::vector<glm::vec3>& sun = lighting.patch_sun;
   sun.assign(n, glm::vec3(0));
-  {
-    const TracePhase phase(trace_, "sky");
-    parallel_indices(n, 64, [&](std::size_t p) { sky[p] = sky_light(lighting.condition, patch_sky_, p); });
-  }
   const std::size_t node_count = node_sky_.row_count();
   lighting.node_indirect = node_always_;
   {
@@ -80,10 +80,7 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
       const int patch = patch_of_slot_[e.element / per_slot];
       sun[patch] += e.illuminance * element_share_[patch * per_slot + e.element % per_slot];
     }
-    std::vector<glm::vec3> direct(n);
-    for (std::size_t p = 0; p < n; ++p) direct[p] = sky[p] + sun[p];
-    lighting.sweeps =
-        interreflection_->solve(patch_emitted_, direct, options_.tolerance, kMaximumCycles, lighting.patch_irradiance);
+    solve_with_panels(residual, lighting);
     lighting.patch_smooth_radiosity.resize(n);
     for (std::size_t p = 0; p < n; ++p)
       lighting.patch_smooth_radiosity[p] = (connects_emitters_ ? glm::vec3(0) : patch_emitted_[p]) +
@@ -95,7 +92,7 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
     std::vector<glm::vec4> radiosity(n);
     for (std::size_t p = 0; p < n; ++p) radiosity[p] = glm::vec4(lighting.patch_smooth_radiosity[p], 0);
     parallel_indices(node_count, 64, [&](std::size_t i) {
-      lighting.node_sky[i] = sky_light(lighting.condition, node_sky_, i);
+      lighting.node_sky[i] = sky_light(lighting, node_sky_, i);
       lighting.node_indirect[i] += glm::vec3(node_rows_->patches.dot(i, radiosity) + node_through_.dot(i, radiosity));
     });
   }
@@ -136,7 +133,7 @@ std::vector<Irradiance> Engine::illuminance(const Lighting& lighting, const Sens
   parallel_indices(result.size(), 1, [&](std::size_t i) {
     const Node& node = sensors.nodes[i];
     result[i].direct = direct_light_->illuminance(lighting.condition.beams, node.position, node.normal);
-    result[i].sky = sky_light(lighting.condition, sensors.sky, i);
+    result[i].sky = sky_light(lighting, sensors.sky, i);
     result[i].indirect = first_bounce.irradiance(node.position, node.normal, FirstBounce::Rays::kMany) +
                          sensors.patches.dot(i, lighting.patch_smooth_radiosity);
   });

@@ -23,7 +23,7 @@ struct LitElement {
 ///
 /// Elements look for the sun through openings. An opening that is smaller than an element would be missed by most of
 /// their samples: its light is sent from the opening instead. Light belongs to the first opening that a point sees on
-/// its way to the sun, so that none is counted twice.
+/// its way to the sun, so that none is counted twice. Lobes come in shafts, whose part of an element is found exactly.
 class DirectLight {
  public:
   /// small_opening_m2: area of an element; opening faces below it send their light themselves.
@@ -46,9 +46,9 @@ class DirectLight {
   /// behind openings cost rays only where the outline of an opening falls on them.
   std::vector<LitElement> deposit(const std::vector<Beam>& beams, const Receivers& receivers, std::uint32_t seed) const;
 
-  /// Share of a beam that arrives at lifted points: 0 where something opaque intervenes, else the transmittance.
-  void beam_transmission(glm::vec3 direction_to_source, std::span<const glm::vec3> points,
-                         std::span<float> share) const;
+  /// Share of a beam that arrives at lifted points: 0 where something opaque intervenes, else the transmittance. Of a
+  /// lobe: what the openings before its panel leave, where the panel is the first opening that the point sees.
+  void beam_transmission(const Beam& beam, std::span<const glm::vec3> points, std::span<float> share) const;
 
   /// Direct illuminance at a lifted point with a shading normal [lx].
   glm::vec3 illuminance(const std::vector<Beam>& beams, glm::vec3 point, glm::vec3 normal) const;
@@ -66,9 +66,12 @@ class DirectLight {
                                    const Patterns& patterns) const;
   /// Which receivers each beam may reach.
   std::vector<std::vector<char>> reach(const std::vector<Beam>& beams, const Receivers& receivers) const;
+  std::vector<char> reach_of_lobe(const Beam& lobe, const Receivers& receivers) const;
   bool is_partly_lit(int slot, int element, std::span<const float> share) const;
-  void beam_on_slot(glm::vec3 direction, int slot, const Corners& corners, const Patterns& patterns,
-                    std::vector<float>& mean) const;
+  void sun_on_slot(const Beam& sun, int slot, const Corners& corners, const Patterns& patterns,
+                   std::vector<float>& mean) const;
+  void lobe_on_slot(const Beam& lobe, int slot, std::uint32_t seed, std::vector<float>& mean) const;
+  void shaft_transmission(const Beam& lobe, std::span<const glm::vec3> points, std::span<float> share) const;
   void sources_on_slot(int slot, const Corners& corners, glm::vec3 normal, const Patterns& patterns,
                        std::vector<glm::vec3>& sum) const;
 

@@ -24,6 +24,7 @@ struct Irradiance {
 /// Light of a condition, as Engine::relight found it. Shown, measured and kept as it is; never changed.
 struct Lighting {
   Condition condition;
+  std::vector<glm::vec3> panel_radiance;           ///< of panels into their exit bins [cd/m²], without lobes
   std::vector<glm::vec3> node_sky, node_indirect;  ///< irradiance of each node [lx]
   std::vector<glm::vec3> patch_irradiance;         ///< all light [lx]
   std::vector<glm::vec3> patch_smooth_radiosity;   ///< what nodes find by rays: M + rho (E - direct) [lm/m²]
