@@ -5,8 +5,8 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include "transom/product_sweep.h"
 #include "transom/section.h"
-#include "transom/section_sweep.h"
 #include "transom/unit_cell.h"
 
 namespace nb = nanobind;
@@ -15,12 +15,16 @@ using namespace transom;
 
 namespace {
 
-using Directions = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Corners = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Facets = nb::ndarray<const int, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu>;
 
 constexpr const char* kTraceWords =
     "Exits (N, 4) transmitted and reflected as direction and flux, then the shares absorbed and unfinished.";
+
+constexpr const char* kSweepWords =
+    "Of directions (N, 3): exits (M, 4) transmitted as direction and flux, the direction (M,) that each belongs to, "
+    "and "
+    "the shares (N,) transmitted and reflected.";
 
 // Exits as (N, 4): direction and flux.
 nb::ndarray<nb::numpy, double> exits_array(const std::vector<Exit>& exits) {
@@ -53,6 +57,21 @@ nb::tuple traced(const Trace& trace, int ray_count, std::uint32_t seed) {
     light = trace(options);
   }
   return nb::make_tuple(exits_array(light.transmitted), exits_array(light.reflected), light.absorbed, light.unfinished);
+}
+
+template <typename Trace>
+nb::tuple swept(const Trace& trace, const Corners& directions, int ray_count, std::uint32_t seed) {
+  std::vector<glm::dvec3> incident(directions.shape(0));
+  for (std::size_t i = 0; i < incident.size(); ++i)
+    incident[i] = {directions(i, 0), directions(i, 1), directions(i, 2)};
+  ProductSweep sweep;
+  {
+    const nb::gil_scoped_release release;
+    sweep = sweep_directions(trace, incident, ray_count, seed);
+  }
+  return nb::make_tuple(exits_array(sweep.transmitted), owned_array(std::move(sweep.incidence)),
+                        owned_array(std::move(sweep.transmitted_shares)),
+                        owned_array(std::move(sweep.reflected_shares)));
 }
 
 }  // namespace
@@ -121,7 +140,14 @@ void bind_section(nb::module_& m) {
             return traced([&](const TraceOptions& options) { return cell.trace(vector(direction), options); },
                           ray_count, seed);
           },
-          "direction"_a, "ray_count"_a, "seed"_a, kTraceWords);
+          "direction"_a, "ray_count"_a, "seed"_a, kTraceWords)
+      .def(
+          "sweep",
+          [](const UnitCellTracer& cell, const Corners& directions, int ray_count, std::uint32_t seed) {
+            return swept([&](glm::dvec3 d, const TraceOptions& options) { return cell.trace(d, options); }, directions,
+                         ray_count, seed);
+          },
+          "directions"_a, "ray_count"_a, "seed"_a, kSweepWords);
 
   m.def(
       "trace_section",
@@ -132,21 +158,10 @@ void bind_section(nb::module_& m) {
       "section"_a, "direction"_a, "ray_count"_a, "seed"_a, kTraceWords);
 
   m.def(
-      "trace_section_sweep",
-      [](const Section& section, const Directions& directions, int ray_count, std::uint32_t seed) {
-        std::vector<glm::dvec3> incident(directions.shape(0));
-        for (std::size_t i = 0; i < incident.size(); ++i)
-          incident[i] = {directions(i, 0), directions(i, 1), directions(i, 2)};
-        SectionSweep sweep;
-        {
-          const nb::gil_scoped_release release;
-          sweep = trace_section_sweep(section, incident, ray_count, seed);
-        }
-        return nb::make_tuple(exits_array(sweep.transmitted), owned_array(std::move(sweep.incidence)),
-                              owned_array(std::move(sweep.transmitted_shares)),
-                              owned_array(std::move(sweep.reflected_shares)));
+      "sweep_section",
+      [](const Section& section, const Corners& directions, int ray_count, std::uint32_t seed) {
+        return swept([&](glm::dvec3 d, const TraceOptions& options) { return trace_section(section, d, options); },
+                     directions, ray_count, seed);
       },
-      "section"_a, "directions"_a, "ray_count"_a, "seed"_a,
-      "Of directions (N, 3): exits (M, 4) transmitted as direction and flux, the direction (M,) that each belongs to, "
-      "and the shares (N,) transmitted and reflected.");
+      "section"_a, "directions"_a, "ray_count"_a, "seed"_a, kSweepWords);
 }

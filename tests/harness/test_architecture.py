@@ -48,7 +48,9 @@ TOP_LEVEL = {
     "tools",
 }
 
-REFERENCE_MAY_IMPORT = ("bundle", "colour", "daylight", "errors", "fenestration", "glass", "renderer", "scene")
+REFERENCE_MAY_IMPORT = (
+    *("bsdf", "bundle", "colour", "daylight", "errors", "fenestration", "glass", "products", "renderer", "scene"),
+)
 """Modules of transom that references share with the engine's side: one scene, one sky, one glass, one product."""
 
 ENGINE_MAY_INCLUDE = {

@@ -34,7 +34,7 @@ def choose_product(
             raise InputError("does not exist", file=file, field="product", value=name)
         return ProductChoice(str(file), (), _digest({"file": hashlib.sha256(file.read_bytes()).hexdigest()}))
     product = load_product(name).with_parameters(parameters)
-    product.section()
+    product.tracer()
     digest = _digest({"shape": product.record.shape, "parameters": product.record.parameters})
     return ProductChoice(name, tuple(parameters.items()), digest)
 

@@ -1,4 +1,4 @@
-"""Products whose section is known: light of the very direction of the sun is traced through them."""
+"""Products whose geometry is known: light of the very direction of the sun is traced through them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from transom.bsdf.directions import AngleBasis
 from transom.fenestration.bins import PANEL_BINS, directions_within, mirror_in_x
 from transom.fenestration.splitting import split
 from transom.fenestration.through import SunThrough
-from transom.products.section import Section
+from transom.products.section import Exits, Section
+from transom.products.unit_cell import UnitCell
 
 Float64 = NDArray[np.float64]
 
@@ -33,9 +34,10 @@ SEED = 1
 
 @dataclass(frozen=True, eq=False)
 class TracedFenestration:
-    """A product by its section, which is extruded along x, so that light mirrored in x leaves mirrored in x."""
+    """A product by its section or its unit cell. A section is extruded along x, so that light mirrored in x leaves
+    mirrored in x: of its incident bins only those with x >= 0 are traced."""
 
-    section: Section
+    geometry: Section | UnitCell
 
     @property
     def basis(self) -> AngleBasis:
@@ -44,31 +46,40 @@ class TracedFenestration:
     def sun(self, incident: Float64) -> SunThrough:
         return self._kept(tuple(float(v) for v in incident))
 
+    def exits(self, incident: Float64) -> Exits:
+        """All light of one direction (3,) that leaves into the room, before it is split."""
+        return self.geometry.trace(incident, SUN_RAYS, SEED).transmitted
+
     @cached_property
     def _kept(self) -> Callable[[tuple[float, ...]], SunThrough]:
         return lru_cache(maxsize=SUNS_KEPT)(self._traced_sun)
 
     def _traced_sun(self, incident: tuple[float, ...]) -> SunThrough:
-        exits = self.section.trace(incident, SUN_RAYS, SEED).transmitted
+        exits = self.exits(np.array(incident))
         return split(exits.directions, exits.flux, self.basis)
 
     @cached_property
     def _matrix(self) -> Float64:
-        """Only incident bins with x >= 0 are traced; the others are their mirror images."""
-        mirrored, own = mirror_in_x(self.basis), self._traced_bins
-        sweep = self.section.sweep(self._directions(own, BIN_DIRECTIONS), BIN_RAYS, SEED)
+        mirrored, own = self._mirrored, self._traced_bins
+        sweep = self.geometry.sweep(self._directions(own, BIN_DIRECTIONS), BIN_RAYS, SEED)
         count = self.basis.count
         column = own[sweep.incidence // BIN_DIRECTIONS]
         cell = self.basis.bin_of(sweep.transmitted.directions) * count + column
         flux = np.bincount(cell, sweep.transmitted.flux / BIN_DIRECTIONS, count * count).reshape(count, count)
         turned = np.zeros_like(flux)
         turned[np.ix_(mirrored, mirrored[own])] = flux[:, own]
-        flux = (flux + turned) * np.where(mirrored == np.arange(count), 0.5, 1.0)
+        flux = (flux + turned) * np.where(mirrored == np.arange(count), 0.5, 1.0)  # on the plane: the mean of both
         return flux / self.basis.projected_solid_angles[:, None]
 
     @cached_property
     def _traced_bins(self) -> NDArray[np.int64]:
-        return np.flatnonzero(mirror_in_x(self.basis) >= np.arange(self.basis.count))
+        return np.flatnonzero(self._mirrored >= np.arange(self.basis.count))
+
+    @cached_property
+    def _mirrored(self) -> NDArray[np.int64]:
+        """By bin, the one whose light is the same mirrored in x; itself where nothing says so."""
+        is_extruded = isinstance(self.geometry, Section)
+        return mirror_in_x(self.basis) if is_extruded else np.arange(self.basis.count)
 
     def _directions(self, bins: NDArray[np.int64], count: int) -> Float64:
         return directions_within(self.basis, count)[bins].reshape(-1, 3)
@@ -80,8 +91,8 @@ class TracedFenestration:
     def _room_reflectance(self) -> float:
         own = self._traced_bins
         from_room = self._directions(own, REFLECTED_DIRECTIONS) * [1.0, 1.0, -1.0]
-        by_bin = self.section.sweep(from_room, BIN_RAYS, SEED).reflectance.reshape(len(own), -1).mean(axis=1)
-        weight = self.basis.projected_solid_angles[own] * np.where(mirror_in_x(self.basis)[own] == own, 1, 2)
+        by_bin = self.geometry.sweep(from_room, BIN_RAYS, SEED).reflectance.reshape(len(own), -1).mean(axis=1)
+        weight = self.basis.projected_solid_angles[own] * np.where(self._mirrored[own] == own, 1, 2)
         return float(by_bin @ weight / weight.sum())
 
     def room_reflectance(self) -> float:

@@ -103,6 +103,11 @@ class Section:
         z = [point[1] for line in self.lines for point in line.points()]
         return min(z), max(z)
 
+    @property
+    def is_diffuse(self) -> bool:
+        """Whether any of its lines scatters."""
+        return any(line.kind == "diffuse" for line in self.lines)
+
     @cached_property
     def _core(self) -> _engine.Section:
         low, high = self.depth
@@ -132,10 +137,13 @@ class Section:
 
     def sweep(self, directions: Float64, rays: int = 16, seed: int = 1) -> Sweep:
         """Sends light along each of `directions` (N, 3) through the product: many directions, few rays each."""
-        exits, incidence, sent, back = _engine.trace_section_sweep(
-            self._core, np.ascontiguousarray(directions, np.float64), rays, seed
-        )
-        return Sweep(Exits(exits[:, :3], exits[:, 3]), incidence.astype(np.int64), sent, back)
+        return swept(_engine.sweep_section(self._core, np.ascontiguousarray(directions, np.float64), rays, seed))
+
+
+def swept(found: tuple[Float64, NDArray[np.uint32], Float64, Float64]) -> Sweep:
+    """What the engine's sweeps give, by name."""
+    exits, incidence, sent, back = found
+    return Sweep(Exits(exits[:, :3], exits[:, 3]), incidence.astype(np.int64), sent, back)
 
 
 def polyline(points: Sequence[Point], **side: object) -> list[Line]:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from transom.products.section import Line, Point, Section, polyline
+from transom.products.unit_cell import UnitCell, perforated_sheet
 
 AIR = (1.0, 0.0)
 SHEET_M = 1e-6
@@ -22,7 +23,7 @@ class Shape:
     """A builder and what it is."""
 
     words: str
-    build: Callable[..., Section]
+    build: Callable[..., Section | UnitCell]
 
     def parameters(self) -> list[str]:
         return list(inspect.signature(self.build).parameters)
@@ -171,17 +172,30 @@ def voids(
 
 
 def reflective_louvre(
-    spacing: float, width: float, rise: float, bow: float, reflectance: float, reflectance_below: float
+    spacing: float,
+    width: float,
+    slope_out: float,
+    slope_in: float,
+    knee_depth: float,
+    knee_drop: float,
+    reflectance: float,
+    reflectance_shade: float = 0.05,
 ) -> Section:
-    """Fixed mirrored slats whose upper side is hollow: they send high sun to the ceiling.
+    """Fixed slats with a hollow mirror above, which send sun to the ceiling [US 6,239,910: light reflecting segment].
 
-    rise: of the room edge over the outer edge. bow: how far the middle hangs below the line between the edges.
+    slope_out, slope_in: of the mirror at its outdoor and room edge, degrees from horizontal, positive rising into the
+    room. Below, a dark face (light shading segment) runs from the outdoor edge to a knee, knee_depth in and knee_drop
+    under that edge, and a mirror (light redirecting segment) from there to the room edge.
     """
-    _require(spacing > 0 and width > 0 and bow >= 0, "spacing and width must be > 0, bow not negative")
-    outer, inner = (0.0, 0.0), (rise, width)
+    _require(spacing > 0 and width > knee_depth > 0, "spacing > 0 and 0 < knee_depth < width")
+    _require(-90 < slope_out < slope_in < 90, "-90 < slope_out < slope_in < 90 degrees")
+    middle, turn = math.radians(slope_out + slope_in) / 2, math.radians(slope_in - slope_out)
+    outer, inner, knee = (0.0, 0.0), (width * math.tan(middle), width), (-knee_drop, knee_depth)
+    bow = 0.5 * width / math.cos(middle) * math.tan(turn / 4)
     lines = [
         _line(outer, inner, bow=bow, **_side("right", reflectance, 0.0)),
-        _line(_below(outer), _below(inner), bow=bow, **_side("left", reflectance_below, 0.0)),
+        _line(_below(outer), knee, bow=0.0, **_side("left", reflectance_shade, 0.0)),
+        _line(knee, _below(inner), bow=0.0, **_side("left", reflectance, 0.0)),
     ]
     return Section(spacing, (AIR,), tuple(lines))
 
@@ -194,6 +208,7 @@ SHAPES: dict[str, Shape] = {
     "curved_lamellae": Shape("curved bars between panes", curved_lamellae),
     "voids": Shape("a sheet with slender voids", voids),
     "reflective_louvre": Shape("fixed hollow mirrors", reflective_louvre),
+    "perforated_sheet": Shape("a thin sheet with round holes", perforated_sheet),
 }
 
 

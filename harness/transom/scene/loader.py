@@ -11,7 +11,6 @@ import numpy as np
 from pydantic import ValidationError
 
 from transom.errors import InputError
-from transom.fenestration import choice as product_choice
 from transom.scene import checks
 from transom.scene.geometry import build_mesh
 from transom.scene.mesh import read_mesh
@@ -164,7 +163,9 @@ def _opening(entry: OpeningTable, index: int, folder: Path, shown: str) -> Openi
     product = None
     if entry.glazing == "product":
         try:
-            product = product_choice.choose_product(entry.product, entry.parameters, folder)
+            from transom.fenestration.choice import choose_product  # products read meshes: not while this is imported
+
+            product = choose_product(entry.product, entry.parameters, folder)
         except InputError as error:
             raise InputError(
                 f"cannot be used: {error}", file=shown, field=f"openings[{index}].product", value=entry.product
