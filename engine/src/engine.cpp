@@ -111,23 +111,13 @@ glm::vec3 Engine::reflectance(int face, Side side) const {
   return side == 1 ? glm::vec3(scene_.openings[material.opening].diffuse_reflectance) : glm::vec3(0);
 }
 
-std::vector<Share> Engine::to_slots(std::vector<Share> elements) const {
-  for (Share& share : elements) share.index /= mesh_->elements_per_slot();
-  merge_shares(elements);
-  return elements;
-}
-
-std::vector<Share> Engine::patches_at(const std::vector<Share>& slots) const {
+std::vector<Share> Engine::to_patches(const std::vector<Share>& slots) const {
   std::vector<Share> patches;
   patches.reserve(slots.size());
   for (const Share& share : slots)
     if (patch_of_slot_[share.index] >= 0) patches.push_back({patch_of_slot_[share.index], share.weight});
   merge_shares(patches);
   return patches;
-}
-
-std::vector<Share> Engine::to_patches(const std::vector<Share>& elements) const {
-  return patches_at(to_slots(elements));
 }
 
 void Engine::assemble_transfer(const Known& known) {
@@ -143,7 +133,7 @@ void Engine::assemble_transfer(const Known& known) {
     patch_reflectance_[p] = reflectance(slot.face, slot.side);
     patch_emitted_[p] = kPi * scene_.materials[faces_.faces[slot.face].material].luminance;
     row_sums[p] = is_interior_[p] ? 1.f : 1.f - row.around->escaped;
-    through_.append(patches_at(row.beyond->through));
+    through_.append(to_patches(row.beyond->through));
     facts_.kept_patch_rows += known.has_surroundings && known.engine->patch_of_slot_[slot_of_patch_[p]] >= 0;
     patch_sky_.append(row.beyond->sky);
   }
@@ -158,7 +148,7 @@ void Engine::assemble_transfer(const Known& known) {
     facts_.defects = known.engine->facts_.defects;
   } else {
     SparseRows sampled;
-    for (const PatchRow& row : patch_rows_) sampled.append(patches_at(row.around->reached));
+    for (const PatchRow& row : patch_rows_) sampled.append(to_patches(row.around->reached));
     facts_.defects = make_reciprocal(sampled, patch_area_, row_sums);
     form_factors_ = std::make_shared<const SparseRows>(std::move(sampled));
   }
@@ -247,7 +237,7 @@ std::shared_ptr<const Engine::NodeRows> Engine::node_rows(const Known& known) co
       const NodeRows& known_rows = *known.engine->node_rows_;
       rows[i].reached = known_rows.patches.row(other);
       for (Share& share : rows[i].reached) share.index = known.engine->slot_of_patch_[share.index];
-      rows[i].reached = patches_at(rows[i].reached);
+      rows[i].reached = to_patches(rows[i].reached);
       rows[i].sky = known_rows.sky.row(other);
       rows[i].exposure = known_rows.exposure[other];
     } else {

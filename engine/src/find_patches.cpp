@@ -69,15 +69,13 @@ Engine::PatchRow Engine::patch_row(int slot, const Known& known) const {
   if (known_row) {
     row.around = known_row->around;
   } else {
-    GatherRow around = gatherer_->surroundings_of_patch(slot, options_.patch_samples, seed);
-    around.reached = to_slots(around.reached);
-    row.around = std::make_shared<const GatherRow>(std::move(around));
+    row.around =
+        std::make_shared<const GatherRow>(gatherer_->surroundings_of_patch(slot, options_.patch_samples, seed));
   }
   GatherRow beyond;
   beyond.exposure = row.around->exposure;
   beyond.sky = row.around->sky;
   gatherer_->look_through_openings(slot, options_.patch_samples, seed, beyond);
-  beyond.through = to_slots(beyond.through);
   row.beyond = std::make_shared<const GatherRow>(std::move(beyond));
   return row;
 }

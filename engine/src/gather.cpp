@@ -49,8 +49,8 @@ void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint
   Hit hits[kBlock];
   int buried = 0, escaped = 0;
   double inverse_distance = 0;
-  std::vector<Share>& reached = row.reached;
-  reached.reserve(static_cast<std::size_t>(count));
+  std::vector<int> slots;  // one a ray
+  slots.reserve(static_cast<std::size_t>(count));
   std::vector<int> open_bins;
   auto next = order.begin();
   for (int begin = 0; begin < count; begin += kBlock) {
@@ -70,7 +70,7 @@ void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint
       } else if (mesh_.faces().is_inside_solid(hits[i].face, hits[i].side)) {
         ++buried;
       } else {
-        reached.push_back({mesh_.element_at(hits[i]), 1});
+        slots.push_back(mesh_.slot_at(hits[i]));
         inverse_distance += 1 / std::max(hits[i].t, mesh_.faces().ray_offset());
       }
     }
@@ -79,8 +79,12 @@ void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint
   row.exposure = static_cast<float>(exposed) / static_cast<float>(count);
   if (exposed == 0) return;
   const float share = 1 / static_cast<float>(exposed);
-  merge_shares(reached);
-  for (Share& s : reached) s.weight *= share;
+  std::sort(slots.begin(), slots.end());
+  for (auto first = slots.begin(); first != slots.end();) {
+    const auto last = std::find_if(first, slots.end(), [&](int slot) { return slot != *first; });
+    row.reached.push_back({*first, share * static_cast<float>(last - first)});
+    first = last;
+  }
   for (const int bin : open_bins) row.sky.push_back({bin, kPi * share});
   row.escaped = static_cast<float>(escaped) * share;
   row.harmonic_distance = inverse_distance > 0 ? static_cast<float>(exposed / inverse_distance) : Ray::kInfinity;
@@ -183,7 +187,7 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
     if (hits[i].face < 0)
       row.sky.push_back({sky_(segments[i].direction), weight});
     else if (!mesh_.faces().is_inside_solid(hits[i].face, hits[i].side))
-      row.through.push_back({mesh_.element_at(hits[i]), weight / kPi});
+      row.through.push_back({mesh_.slot_at(hits[i]), weight / kPi});
   }
 }
 

@@ -160,9 +160,7 @@ class Engine {
   std::uint32_t node_seed(const Node& node) const;
   void solve_classic();
   void show_classic(Lighting& lighting) const;
-  std::vector<Share> to_slots(std::vector<Share> elements) const;
-  std::vector<Share> patches_at(const std::vector<Share>& slots) const;
-  std::vector<Share> to_patches(const std::vector<Share>& elements) const;
+  std::vector<Share> to_patches(const std::vector<Share>& slots) const;
   glm::vec3 sky_light(const Condition& condition, const SparseRows& rows, std::size_t row) const;
   void light_always();
   std::vector<int> beam_slots() const;

@@ -1,4 +1,4 @@
-/// @file Where the light of a point or a patch comes from: shares of elements, sky bins, and openings looked through.
+/// @file Where the light of a point or a patch comes from: shares of slots, sky bins, and openings looked through.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -27,8 +27,8 @@ struct Share {
 
 /// The light of one receiver as weights. Illuminance E = sum reached B + sum through B + sum sky L.
 struct GatherRow {
-  std::vector<Share> reached;   ///< elements seen without looking through an opening: form factors
-  std::vector<Share> through;   ///< elements seen through openings: form factors x transmittance
+  std::vector<Share> reached;   ///< slots seen without looking through an opening: form factors
+  std::vector<Share> through;   ///< slots seen through openings: form factors x transmittance
   std::vector<Share> sky;       ///< sky bins (and ground): illuminance per luminance [lx per cd/m²]
   float escaped = 0;            ///< share of the hemisphere that meets nothing: open sky
   float exposure = 1;           ///< share of the receiver that does not lie inside a solid

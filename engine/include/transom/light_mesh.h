@@ -44,6 +44,9 @@ class LightMesh {
   }
   int first_cell(int face) const { return first_cell_[static_cast<std::size_t>(face)]; }
 
+  /// Slot under a hit.
+  int slot_at(const Hit& hit) const { return slot_index(hit.face, hit.side, grid(hit.face).locate(hit.st).cell); }
+
   /// Element under a hit, counted over all slots: slot * elements_per_slot + element.
   int element_at(const Hit& hit) const;
 
