@@ -51,9 +51,8 @@ Lighting Engine::begin_relight(Condition condition, const Lighting* previous) co
     }
     for (const LitElement& e : lit) {
       const int patch = patch_of_slot_[e.element / per_slot];
-      const Slot slot = mesh_->slot(e.element / per_slot);
       lighting.patch_sun[patch] +=
-          e.illuminance * (mesh_->element_area(slot.face, slot.cell, e.element % per_slot) / patch_area_[patch]);
+          e.illuminance * (mesh_->element_area(e.element) / patch_area_[patch]);
     }
   }
   std::vector<glm::vec3> direct(n);

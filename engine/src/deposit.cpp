@@ -134,6 +134,10 @@ void DirectLight::deposit_on_slot(const std::vector<Beam>& beams, int slot_index
   const Face& face = mesh_.faces().faces[slot.face];
   const glm::vec3 normal = slot.side == 0 ? face.normal : -face.normal;
   const int element_count = mesh_.elements_per_slot();
+  if (mesh_.is_cluster(slot_index)) {
+    for (int e = 0; e < element_count; ++e) deposit_on_cluster(beams, slot_index * element_count + e, seed, lit);
+    return;
+  }
   std::vector<glm::vec3> sum;
   std::vector<float> mean;
   for (const Beam& beam : beams) {
@@ -154,6 +158,19 @@ void DirectLight::deposit_on_slot(const std::vector<Beam>& beams, int slot_index
   }
   for (std::size_t e = 0; e < sum.size(); ++e)
     if (sum[e] != glm::vec3(0)) lit.push_back({slot_index * element_count + static_cast<int>(e), sum[e]});
+}
+
+// Faces of a cluster look many ways: each sample asks for the light at its own place.
+void DirectLight::deposit_on_cluster(const std::vector<Beam>& beams, int element, std::uint32_t seed,
+                                     std::vector<LitElement>& lit) const {
+  if (!(mesh_.element_area(element) > 0)) return;
+  const SobolSequence sequence(hash_seed(seed, static_cast<std::uint64_t>(element)));
+  glm::vec3 sum(0);
+  for (std::uint32_t i = 0; i < kSamplesPerElement; ++i) {
+    const Node place = mesh_.place_on_element(element, sequence.point2(i));
+    sum += illuminance(beams, place.position, place.normal) / static_cast<float>(kSamplesPerElement);
+  }
+  if (sum != glm::vec3(0)) lit.push_back({element, sum});
 }
 
 // Takes the light away that comes to the points through a small opening first.
@@ -200,9 +217,8 @@ std::map<int, glm::vec3> DirectLight::send_through_small_openings(const std::vec
       for (std::size_t i = 0; i < hits.size(); ++i) {
         const Hit& hit = hits[i];
         if (share[i] <= 0 || hit.face < 0 || mesh_.faces().is_inside_solid(hit.face, hit.side)) continue;
-        const int element = mesh_.element_at(hit), per_slot = mesh_.elements_per_slot();
-        const Slot slot = mesh_.slot(element / per_slot);
-        const float area = mesh_.element_area(slot.face, slot.cell, element % per_slot);
+        const int element = mesh_.element_at(hit);
+        const float area = mesh_.element_area(element);
         if (area > 0) sent[element] += beam.normal_illuminance * (share[i] * flux_share / area);
       }
     }

@@ -49,7 +49,7 @@ void Engine::solve(const Engine* solved) {
                  ? solved->edges_
                  : choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
     facts_.maximum_edge_m = *std::min_element(edges_.begin(), edges_.end());
-    mesh_ = std::make_unique<LightMesh>(faces_, edges_, options_.elements_per_edge);
+    mesh_ = std::make_unique<LightMesh>(faces_, edges_, options_.elements_per_edge, clusters());
     gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_);
     const float element_edge = facts_.maximum_edge_m / static_cast<float>(options_.elements_per_edge);
     direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources, scene_.materials,
@@ -85,6 +85,14 @@ void Engine::solve(const Engine* solved) {
   }
   facts_.face_count = static_cast<int>(faces_.faces.size());
   facts_.patch_count = static_cast<int>(slot_of_patch_.size());
+}
+
+// Small faces taken together, where each for itself would be too many.
+FaceClusters Engine::clusters() const {
+  const std::vector<char> is_small =
+      find_small_faces(faces_, scene_.materials, edges_, options_.target_patch_count);
+  return {faces_, is_small, facts_.maximum_edge_m, options_.target_patch_count / 2,
+          options_.elements_per_edge * options_.elements_per_edge};
 }
 
 Engine::Known Engine::known_from(const Engine* solved) const {
@@ -129,7 +137,7 @@ void Engine::assemble_transfer(const Known& known) {
   for (std::size_t p = 0; p < n; ++p) {
     const PatchRow& row = patch_rows_[p];
     const Slot slot = mesh_->slot(slot_of_patch_[p]);
-    patch_area_[p] = std::max(1e-6f, row.around->exposure) * mesh_->cell_area(slot.face, slot.cell);
+    patch_area_[p] = std::max(1e-6f, row.around->exposure) * mesh_->slot_area(slot_of_patch_[p]);
     patch_reflectance_[p] = reflectance(slot.face, slot.side);
     patch_emitted_[p] = kPi * scene_.materials[faces_.faces[slot.face].material].luminance;
     row_sums[p] = is_interior_[p] ? 1.f : 1.f - row.around->escaped;
@@ -154,10 +162,7 @@ void Engine::assemble_transfer(const Known& known) {
   }
   std::vector<PatchPlace> places(n);
   for (std::size_t p = 0; p < n; ++p) {
-    const Slot slot = mesh_->slot(slot_of_patch_[p]);
-    const Face& face = faces_.faces[slot.face];
-    places[p] = {face.position(mesh_->cell_parameters(slot.face, slot.cell, glm::vec2(1.f / 3))),
-                 slot.side == 0 ? face.normal : -face.normal};
+    places[p] = {mesh_->middle_of(slot_of_patch_[p]).position, mesh_->normal_of(slot_of_patch_[p])};
   }
   interreflection_ =
       std::make_unique<Interreflection>(*form_factors_, through_, patch_reflectance_, patch_area_, places);
@@ -169,8 +174,7 @@ void Engine::assemble_transfer(const Known& known) {
 std::vector<int> Engine::cell_divisions() const {
   std::vector<int> divisions;
   for (std::size_t p = 0; p < patch_rows_.size(); ++p) {
-    const Slot slot = mesh_->slot(slot_of_patch_[p]);
-    const float size = std::sqrt(mesh_->cell_area(slot.face, slot.cell));
+    const float size = std::sqrt(mesh_->slot_area(slot_of_patch_[p]));
     const float distance = std::max(patch_rows_[p].around->harmonic_distance, 1e-6f * faces_.extent);
     const float wanted = size / (options_.node_spacing * distance);
     const bool is_small = size < kLeastDividedSize * facts_.maximum_edge_m;
@@ -184,7 +188,8 @@ void Engine::gather_nodes(Known& known) {
   const std::vector<int> divisions = cell_divisions();
   std::vector<std::pair<int, int>> cells;  // slot, divisions
   for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)
-    if (patch_reflectance_[p] != glm::vec3(0)) cells.push_back({slot_of_patch_[p], divisions[p]});
+    if (patch_reflectance_[p] != glm::vec3(0) && !mesh_->is_cluster(slot_of_patch_[p]))  // a cluster shows its patch
+      cells.push_back({slot_of_patch_[p], divisions[p]});
   std::sort(cells.begin(), cells.end());
   std::vector<int> slots, slot_divisions;
   for (const auto& [slot, division] : cells) {

@@ -78,9 +78,8 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
     const TracePhase phase(trace_, "interreflection");
     for (const LitElement& e : lit) {
       const int patch = patch_of_slot_[e.element / per_slot];
-      const Slot slot = mesh_->slot(e.element / per_slot);
       sun[patch] +=
-          e.illuminance * (mesh_->element_area(slot.face, slot.cell, e.element % per_slot) / patch_area_[patch]);
+          e.illuminance * (mesh_->element_area(e.element) / patch_area_[patch]);
     }
     std::vector<glm::vec3> direct(n);
     for (std::size_t p = 0; p < n; ++p) direct[p] = sky[p] + sun[p];

@@ -173,8 +173,7 @@ void Engine::check_closed() {
   if (facts_.leak_share <= kLeakTolerance) return;
   const Slot slot = mesh_->slot(slot_of_patch_[worst_patch]);
   const glm::dvec3 place =
-      faces_.origin + glm::dvec3(mesh_->lifted_position(
-                          slot.face, slot.side, mesh_->cell_parameters(slot.face, slot.cell, glm::vec2(1.f / 3))));
+      faces_.origin + glm::dvec3(mesh_->middle_of(slot_of_patch_[worst_patch]).position);
   std::ostringstream text;
   text.precision(3);
   if (scene_.materials[faces_.faces[slot.face].material].opening >= 0)

@@ -106,7 +106,7 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
     float highest = -1;
     for (const glm::vec3& corner : t.corner)
       highest = std::max(highest, glm::dot(corner - middle.position, middle.normal));
-    if (highest <= 0) continue;
+    if (highest < 0) continue;
     importance[k] = triangle_from(t, middle.position).solid_angle() + 1e-9;
     total += importance[k];
   }
@@ -205,14 +205,10 @@ void Gatherer::look_through_openings(const Node& point, GatherSamples samples, s
   merge_shares(row.sky);
 }
 
-// A place of a patch from two uniform numbers.
-auto Gatherer::places_on(int slot_index) const {
-  const Slot slot = mesh_.slot(slot_index);
-  const Face& face = mesh_.faces().faces[slot.face];
-  const glm::vec3 normal = slot.side == 0 ? face.normal : -face.normal;
-  return [this, slot, normal](glm::vec2 u) {
-    const glm::vec2 st = mesh_.cell_parameters(slot.face, slot.cell, mesh_.sample_local(slot.face, u));
-    return Origin{mesh_.lifted_position(slot.face, slot.side, st), normal};
+auto Gatherer::places_on(int slot) const {
+  return [this, slot](glm::vec2 u) {
+    const Node place = mesh_.place_on(slot, u);
+    return Origin{place.position, place.normal};
   };
 }
 
@@ -222,13 +218,9 @@ GatherRow Gatherer::surroundings_of_patch(int slot, GatherSamples samples, std::
   return row;
 }
 
-void Gatherer::look_through_openings(int slot_index, GatherSamples samples, std::uint32_t seed, GatherRow& row) const {
-  const Slot slot = mesh_.slot(slot_index);
-  const auto origin_of = places_on(slot_index);
-  const glm::vec2 middle = mesh_.grid(slot.face).is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3);
-  const Origin centre{mesh_.lifted_position(slot.face, slot.side, mesh_.cell_parameters(slot.face, slot.cell, middle)),
-                      origin_of(glm::vec2(0)).normal};
-  gather_openings(centre, origin_of, samples.openings, seed, row);
+void Gatherer::look_through_openings(int slot, GatherSamples samples, std::uint32_t seed, GatherRow& row) const {
+  const Node middle = mesh_.middle_of(slot);
+  gather_openings({middle.position, middle.normal}, places_on(slot), samples.openings, seed, row);
   merge_shares(row.through);
   merge_shares(row.sky);
 }

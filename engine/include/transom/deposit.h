@@ -50,6 +50,8 @@ class DirectLight {
   };
   std::vector<glm::vec3> points_on(int slot, std::span<const int> elements, int samples, std::uint32_t seed) const;
   void beam_on_slot(glm::vec3 direction, int slot, std::uint32_t seed, std::vector<float>& mean) const;
+  void deposit_on_cluster(const std::vector<Beam>& beams, int element, std::uint32_t seed,
+                          std::vector<LitElement>& lit) const;
   void deposit_on_slot(const std::vector<Beam>& beams, int slot, std::uint32_t seed,
                        std::vector<LitElement>& lit) const;
 

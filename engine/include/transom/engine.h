@@ -142,6 +142,7 @@ class Engine {
   };
 
   void solve(const Engine* solved);
+  FaceClusters clusters() const;
   Known known_from(const Engine* solved) const;
   std::vector<int> first_wave() const;
   PatchRow patch_row(int slot, const Known& known) const;
