@@ -91,7 +91,7 @@ def hall_scene(triangle_count: int, opening_count: int, seed: int = 1) -> Scene:
         openings=(Opening("roof", "pane", "clear", 0.8),),
         point_sources=(),
         site=Site("Zurich", math.radians(47.4), math.radians(8.5), 1.0),
-        views=(View("hall", (1.0, 1.0, 1.7), (20.0, 12.0, 1.0), (0.0, 0.0, 1.0), math.radians(60), 640, 480, 2000.0),),
+        views=(View("hall", (0.5, 10.0, 3.0), (20.0, 10.0, 1.5), (0.0, 0.0, 1.0), math.radians(60), 640, 480, 2000.0),),
         conditions=(ConditionSpec("jun21_1200", "2026-06-21T12:00"), ConditionSpec("jun21_1500", "2026-06-21T15:00")),
         regions=(),
         sensors=(_sensors(),),
@@ -121,7 +121,53 @@ def write_hall(folder: Path, scene: Scene) -> Path:
     return folder
 
 
-_TOML = ""
+_TOML = """format = 1
+title = "Hall"
+description = "A hall with trees and bodies under a roof of panes."
+
+[mesh]
+file = "mesh.obj"
+unit = "m"
+up = "z"
+
+[site]
+name = "Zurich"
+latitude_deg = 47.4
+longitude_deg = 8.5
+time_zone_h = 1
+
+[[openings]]
+name = "roof"
+material = "pane"
+glazing = "clear"
+visible_transmittance = 0.8
+
+[[views]]
+name = "hall"
+position_m = [0.5, 10.0, 3.0]
+target_m = [20.0, 10.0, 1.5]
+vertical_fov_deg = 60
+width = 640
+height = 480
+display_white_cd_m2 = 2000
+
+[[conditions]]
+name = "jun21_1200"
+time = "2026-06-21T12:00"
+
+[[conditions]]
+name = "jun21_1500"
+time = "2026-06-21T15:00"
+
+[[sensors]]
+name = "floor"
+corner_m = [1.0, 1.0, 0.1]
+edge_u_m = [28.0, 0.0, 0.0]
+edge_v_m = [0.0, 18.0, 0.0]
+count = [7, 4]
+normal = [0.0, 0.0, 1.0]
+
+"""
 
 
 def _shell(parts: _Parts, opening_count: int) -> None:
@@ -201,6 +247,6 @@ def _body(middle: Float64, count: int) -> tuple[Float64, Int32]:
 
 
 def _sensors() -> SensorSet:
-    x, y = np.meshgrid(np.linspace(2.5, LENGTH_M - 2.5, 6), np.linspace(5.0, WIDTH_M - 5.0, 3), indexing="ij")
+    x, y = np.meshgrid(1 + 28 * (np.arange(7) + 0.5) / 7, 1 + 18 * (np.arange(4) + 0.5) / 4, indexing="xy")
     points = np.stack([x.ravel(), y.ravel(), np.full(x.size, 0.1)], axis=1)
     return SensorSet("floor", points, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
