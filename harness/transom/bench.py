@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from transom.bench_scenes import opening_face_count, with_other_glass, with_panes
+from transom.bench_scenes import opening_face_count, with_other_glass, with_other_paint, with_panes
 from transom.bench_worker import SENSOR_RAYS, phase_seconds
 from transom.daylight.condition import resolve_condition
 from transom.errors import InputError
@@ -49,6 +49,7 @@ QuantityName = Literal[
     "load",
     "solve",
     "reglaze",
+    "recolour",
     "relight_hour",
     "relight_sky",
     "relight_overcast",
@@ -59,7 +60,8 @@ QuantityName = Literal[
 ]
 
 NOTES = (
-    "reglaze is a whole new solve and a relighting: the engine does not yet keep what a new transmittance leaves valid",
+    "reglaze and recolour are edits: another transmittance of every pane, or another reflectance of the first opaque "
+    "material, in a scene that is solved, and a relighting; the answer is that of a fresh solve, bit by bit",
     "relight_sky changes the sky alone and keeps the sun; the engine does all the work of a new hour",
     "lobes are not swept: the engine has no complex fenestration yet, and one beam for the sun; relight_overcast has "
     "none",
@@ -166,7 +168,7 @@ def bench_scene(name: str, progress: CaseProgress, *, budget_s: float, quick: bo
             continue
         share = max(remaining, 0.0) / (len(points) - index) * (2 if index == 0 else 1)
         try:
-            found = _in_own_process(measure_point, name, point, share)
+            found = in_own_process(measure_point, name, point, share)
         except InputError as error:
             if index == 0:
                 raise
@@ -182,7 +184,7 @@ def bench_scene(name: str, progress: CaseProgress, *, budget_s: float, quick: bo
         format=1,
         created=datetime.now(UTC).replace(microsecond=0),
         scene=load_scene(name).name,
-        engine_build=_in_own_process(_engine_build),
+        engine_build=in_own_process(_engine_build),
         budget_s=budget_s,
         load_average=(load, os.getloadavg()[0]),
         measurements=tuple(measurements),
@@ -240,7 +242,7 @@ def measure_point(name: str, point: Point, budget_s: float) -> PointResult:
             seen = len(state["engine"].trace()) if "engine" in state else 0
             action(index)
             spans = state["engine"].trace()
-            phases.append(phase_seconds(spans if quantity in ("solve", "reglaze") else spans[seen:], quantity))
+            phases.append(phase_seconds(spans if quantity in ("solve", "reglaze", "recolour") else spans[seen:], quantity))
 
         seconds = _repeated(once, share * budget_s, least)
         rows.append(_measurement(quantity, point, seconds, phases, scene, state["engine"], beams, points, size))
@@ -282,14 +284,17 @@ def measure_point(name: str, point: Point, budget_s: float) -> PointResult:
         limits = tuple(limit for limit in (memory_copy(), embree_rays()) if limit is not None)
         medians = {phase.name: phase.median for row in rows for phase in row.phases}
         used = utilisations(engine, medians, limits)
-    if whole and scene.openings:
-        glass = [with_other_glass(scene, share) for share in (0.9, 0.8)]
+    if whole:
+        edits: dict[QuantityName, list[Scene]] = {"recolour": [with_other_paint(scene, share) for share in (0.9, 0.8)]}
+        if scene.openings:
+            edits["reglaze"] = [with_other_glass(scene, share) for share in (0.9, 0.8)]
+        for quantity, edited in edits.items():
 
-        def reglaze(index: int) -> None:
-            state["engine"] = Engine.solve(glass[index % 2], options, trace=True)
-            state["engine"].relight(sun[0])
+            def edit(index: int, scenes: list[Scene] = edited) -> None:
+                state["engine"] = engine.edited(scenes[index % 2])
+                state["engine"].relight(sun[0])
 
-        add("reglaze", reglaze, 0.15, least=1, beams=beams)
+            add(quantity, edit, 0.08, least=1, beams=beams)
     return PointResult(tuple(rows), limits, used)
 
 
@@ -403,7 +408,8 @@ def _expected_seconds(point: Point, measurements: Sequence[Measurement]) -> floa
     return 1.5 * last.median * max(wanted / last.patches, 0.3)
 
 
-def _in_own_process(function: Callable[..., Any], *arguments: object) -> Any:
+def in_own_process(function: Callable[..., Any], *arguments: object) -> Any:
+    """The function's answer from a process that has done nothing else."""
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(max_workers=1, mp_context=context) as pool:
         return pool.submit(function, *arguments).result()
