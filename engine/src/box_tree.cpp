@@ -34,9 +34,8 @@ int BoxTree::build(std::size_t first, std::size_t last) {
   const auto place = [&](int i) {
     return boxes_[static_cast<std::size_t>(i)].low[axis] + boxes_[static_cast<std::size_t>(i)].high[axis];
   };
-  std::nth_element(at(first), at(middle), at(last), [&](int a, int b) {
-    return place(a) != place(b) ? place(a) < place(b) : a < b;
-  });
+  std::nth_element(at(first), at(middle), at(last),
+                   [&](int a, int b) { return place(a) != place(b) ? place(a) < place(b) : a < b; });
   build(first, middle);
   const int right = build(middle, last);
   nodes_[static_cast<std::size_t>(number)].right = right;

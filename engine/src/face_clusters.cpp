@@ -83,7 +83,8 @@ FaceClusters::FaceClusters(const Faces& faces, const std::vector<char>& is_small
   element_begin_.assign(elements_.size() + 1, sides_.size());
   area_before_.push_back(0);
   for (const int side : sides_) area_before_.push_back(area_before_.back() + faces.faces[side / 2].area);
-  parallel_indices(static_cast<std::size_t>(count()), 16, [&](std::size_t c) { find_elements(faces, static_cast<int>(c)); });
+  parallel_indices(static_cast<std::size_t>(count()), 16,
+                   [&](std::size_t c) { find_elements(faces, static_cast<int>(c)); });
 }
 
 void FaceClusters::find_clusters(const Faces& faces, const std::vector<char>& is_small, float cube_m,
@@ -177,7 +178,8 @@ std::vector<char> find_small_faces(const Faces& faces, const std::vector<Materia
   std::vector<char> is_small(faces.faces.size(), 0);
   if (static_cast<double>(faces.faces.size()) <= kBearableFaces * target_patch_count) return is_small;
   for (std::size_t f = 0; f < is_small.size(); ++f)
-    is_small[f] = materials[faces.faces[f].material].opening < 0 && longest_edge(faces.faces[f]) < kSmallEdge * edges[f];
+    is_small[f] =
+        materials[faces.faces[f].material].opening < 0 && longest_edge(faces.faces[f]) < kSmallEdge * edges[f];
   return is_small;
 }
 

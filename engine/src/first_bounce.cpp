@@ -85,9 +85,8 @@ void FirstBounce::add(const BrightElement& bright) {
   const float strength = bright.radiosity.x + bright.radiosity.y + bright.radiosity.z;
   if (!(strength > 0)) return;
   if (patches_.empty() || patches_.back().slot != slot_index)
-    patches_.push_back({slot_index, pieces_.size(), pieces_.size(), glm::vec3(0),
-                        mesh_.normal_of(slot_index), glm::vec3(0), 0,
-                        std::sqrt(2 * mesh_.slot_area(slot_index)), mesh_.is_cluster(slot_index)});
+    patches_.push_back({slot_index, pieces_.size(), pieces_.size(), glm::vec3(0), mesh_.normal_of(slot_index),
+                        glm::vec3(0), 0, std::sqrt(2 * mesh_.slot_area(slot_index)), mesh_.is_cluster(slot_index)});
   LitPatch& patch = patches_.back();
   pieces_.push_back({element_shape(mesh_, bright.element), bright.radiosity});
   const ElementShape& shape = pieces_.back().shape;

@@ -137,8 +137,7 @@ std::shared_ptr<const PointLinks::Link> PointLinks::link(int slot_index, const K
         std::binary_search(before->glazed_point.begin(), before->glazed_point.end(), known.point[i]))
       link->glazed_point.push_back(i);
   std::sort(link->glazed_point.begin(), link->glazed_point.end());
-  link->glazed_point.erase(std::unique(link->glazed_point.begin(), link->glazed_point.end()),
-                           link->glazed_point.end());
+  link->glazed_point.erase(std::unique(link->glazed_point.begin(), link->glazed_point.end()), link->glazed_point.end());
   return link;
 }
 
@@ -248,8 +247,7 @@ std::vector<std::shared_ptr<const PointLinks::Link>> PointLinks::links_of(const 
     }
   }
   if (missing.empty()) return found;
-  parallel_indices(missing.size(), 1,
-                   [&](std::size_t k) { found[missing[k]] = link(slots[missing[k]], known); });
+  parallel_indices(missing.size(), 1, [&](std::size_t k) { found[missing[k]] = link(slots[missing[k]], known); });
   const std::lock_guard lock(mutex_);
   for (const std::size_t k : missing) {
     const Link& made = *found[k];
@@ -264,7 +262,7 @@ std::vector<std::shared_ptr<const PointLinks::Link>> PointLinks::links_of(const 
   return found;
 }
 
-PointLinks::LitPatch PointLinks::lit_patch(const std::vector<BrightElement>& bright, std::size_t first,
+PointLinks::LitPatch PointLinks::lit_patch(std::span<const BrightElement> bright, std::size_t first,
                                            std::size_t last) const {
   const int slot = bright[first].element / mesh_.elements_per_slot();
   LitPatch patch{nullptr, first, last, glm::vec3(0), mesh_.normal_of(slot), glm::vec3(0)};
@@ -281,7 +279,7 @@ PointLinks::LitPatch PointLinks::lit_patch(const std::vector<BrightElement>& bri
   return patch;
 }
 
-void PointLinks::add_irradiance(const std::vector<BrightElement>& bright, std::vector<glm::vec3>& irradiance) const {
+void PointLinks::add_irradiance(std::span<const BrightElement> bright, std::vector<glm::vec3>& irradiance) const {
   const int per_slot = mesh_.elements_per_slot();
   std::vector<int> slots;
   for (const BrightElement& b : bright)

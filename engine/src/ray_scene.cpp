@@ -1,34 +1,14 @@
 #include "transom/ray_scene.h"
 
-#if TRANSOM_EMBREE_MAJOR >= 4
-#include <embree4/rtcore.h>
-#else
-#include <embree3/rtcore.h>
-#endif
-
 #include <algorithm>
-#include <string>
 
+#include "embree_device.h"
 #include "transom/error.h"
 
 namespace transom {
 namespace {
 
 constexpr std::size_t kWidth = 16;
-
-void report_error(void*, RTCError code, const char* text) {
-  throw std::runtime_error("Embree error " + std::to_string(static_cast<int>(code)) + ": " + (text ? text : ""));
-}
-
-RTCDevice shared_device() {
-  static const RTCDevice device = [] {
-    RTCDevice made = rtcNewDevice(nullptr);
-    if (!made) throw std::runtime_error("Embree cannot start: rtcNewDevice failed");
-    rtcSetDeviceErrorFunction(made, report_error, nullptr);
-    return made;
-  }();
-  return device;
-}
 
 // Embree 3 takes a context, Embree 4 optional arguments.
 #if TRANSOM_EMBREE_MAJOR >= 4
@@ -171,7 +151,7 @@ void RayScene::occluded(What what, std::span<const Ray> rays, std::span<std::uin
   }
 }
 
-void RayScene::transmittance(std::span<const Ray> rays, std::span<float> shares) const {
+void RayScene::transmittance(std::span<const Ray> rays, std::span<float> shares, Order order) const {
   constexpr int kMaximumCrossings = 64;
   std::fill(shares.begin(), shares.end(), 1.f);
   if (!has_openings_ || rays.empty()) return;
@@ -180,7 +160,7 @@ void RayScene::transmittance(std::span<const Ray> rays, std::span<float> shares)
   for (std::size_t i = 0; i < rays.size(); ++i) index[i] = i;
   std::vector<Hit> hits(rays.size());
   for (int crossing = 0; crossing < kMaximumCrossings && !rest.empty(); ++crossing) {
-    intersect(What::kOpenings, rest, {hits.data(), rest.size()});
+    intersect(What::kOpenings, rest, {hits.data(), rest.size()}, order);
     std::size_t kept = 0;
     for (std::size_t k = 0; k < rest.size(); ++k) {
       const Hit& hit = hits[k];

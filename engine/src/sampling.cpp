@@ -88,6 +88,11 @@ float coordinate(std::uint32_t index, int dimension, std::uint32_t seed) {
 
 }  // namespace
 
+double scrambled_coordinate(std::uint32_t index, std::uint32_t seed) {
+  const std::uint32_t shuffled = owen_scramble(index, seed);
+  return owen_scramble(reverse_bits(shuffled), seed * 0x9e3779b9u + 1) / 4294967296.0;
+}
+
 SobolSequence::SobolSequence(std::uint32_t seed) {
   for (std::uint64_t d = 0; d < kDimensions; ++d) seeds_[d] = hash_seed(seed, d);
 }

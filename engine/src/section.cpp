@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
-#include <span>
 #include <sstream>
 
+#include "section_profile.h"
 #include "transom/error.h"
 #include "transom/parallel.h"
 #include "transom/sampling.h"
@@ -13,297 +12,223 @@
 namespace transom {
 namespace {
 
-constexpr double kSameDirection = 1e-9;  // between unit vectors that are one exit
-constexpr double kClose = 1e-9;          // of the period: a hit nearer than this is where the path is
-constexpr std::size_t kGrain = 16;
-constexpr std::size_t kFewExits = 256;
+constexpr double kThin = 1e-12;       // of a beam: a part so narrow is left to its neighbour
+constexpr double kAlongAxis = 1e-12;  // of a direction, across the extrusion: light that never leaves
+constexpr int kEvenDecisions = 4;     // of a path; further ones are independent of other rays
+constexpr std::size_t kGrain = 64;    // rays of a parallel task
 
-/// Intensity and polarisation against the axis `reference`, which is perpendicular to the direction.
-struct Stokes {
-  double i = 1, q = 0, u = 0, v = 0;
-};
-
-struct Branch {
-  glm::dvec2 place;  // (y, z)
+/// Parallel light from the points of start -> end, or one ray where these are one.
+struct Path {
+  glm::dvec2 start, end;  // (y, z)
   glm::dvec3 direction, reference;
   Stokes light;
+  int from = -1;  // line that it starts on
   int events = 0;
-  std::uint64_t stream = 0;  // of random numbers
-  bool is_random = false;    // has met a diffuse surface
-};
+  bool is_spread = false;     // has met an arc
+  bool is_scattered = false;  // has met a diffuse surface
+  std::uint32_t number = 0;   // of a ray, for its point of a sequence
+  std::uint64_t stream = 0;   // of random numbers
 
-/// Amplitude coefficients as what Mueller matrices need: |s|², |p|², and s times the conjugate of p.
-struct Mueller {
-  double s2, p2, real, imaginary;
-};
+  bool is_wide() const { return start != end; }
+  glm::dvec2 at(double share) const { return start + share * (end - start); }
+  glm::dvec2 along() const { return {direction.y, direction.z}; }
+  int decisions = 0;          // taken by chance
+  std::uint32_t history = 0;  // of ways taken: rays of one history decide evenly
 
-Stokes turned(const Stokes& a, double cosine, double sine) {  // to an axis at that angle
-  const double c2 = cosine * cosine - sine * sine, s2 = 2 * cosine * sine;
-  return {a.i, c2 * a.q + s2 * a.u, -s2 * a.q + c2 * a.u, a.v};
-}
-
-Stokes operator*(const Mueller& m, const Stokes& a) {
-  const double sum = 0.5 * (m.s2 + m.p2), difference = 0.5 * (m.s2 - m.p2);
-  return {sum * a.i + difference * a.q, difference * a.i + sum * a.q, m.real * a.u + m.imaginary * a.v,
-          -m.imaginary * a.u + m.real * a.v};
-}
-
-/// Reflection and transmission of flux between two media, for the s and p waves.
-struct Fresnel {
-  Mueller reflected, transmitted;
-  bool is_total = false;
-  double cosine_beyond = 0;
-};
-
-Fresnel fresnel(double n1, double n2, double cosine) {
-  Fresnel f;
-  const double ratio = n1 / n2, sine2 = ratio * ratio * (1 - cosine * cosine);
-  if (sine2 >= 1) {  // total: magnitudes 1, and a phase between s and p
-    f.is_total = true;
-    const double root = std::sqrt(sine2 - 1);
-    const double phase = 2 * (std::atan2(n1 * root, n2 * cosine) - std::atan2(n2 * root, n1 * cosine));
-    f.reflected = {1, 1, std::cos(phase), std::sin(phase)};
-    f.transmitted = {0, 0, 0, 0};
-    return f;
+  double chance() {
+    if (++decisions <= kEvenDecisions) return scrambled_coordinate(number, history);
+    stream = stream * 6364136223846793005ULL + 1442695040888963407ULL;
+    return hash_seed(stream, 0) / 4294967296.0;
   }
-  const double beyond = std::sqrt(1 - sine2);
-  const double rs = (n1 * cosine - n2 * beyond) / (n1 * cosine + n2 * beyond);
-  const double rp = (n2 * cosine - n1 * beyond) / (n2 * cosine + n1 * beyond);
-  f.cosine_beyond = beyond;
-  f.reflected = {rs * rs, rp * rp, rs * rp, 0};
-  const double ts2 = 1 - rs * rs, tp2 = 1 - rp * rp;
-  f.transmitted = {ts2, tp2, std::sqrt(ts2 * tp2), 0};
-  return f;
+};
+
+// Mean of exp(-absorption t) over a beam whose edges go the lengths `near` and `far`.
+double mean_absorption(double absorption, double near, double far) {
+  const double spread = 0.5 * absorption * (far - near);
+  return std::exp(-0.5 * absorption * (near + far)) * (std::abs(spread) < 1e-4 ? 1 : std::sinh(spread) / spread);
 }
 
-/// Two faces of a thin gap of air, with all reflections between them; not coherent.
-Fresnel thin_gap(double index, double cosine) {
-  Fresnel f = fresnel(index, 1, cosine);
-  if (f.is_total) return f;
-  const double s = 2 * f.reflected.s2 / (1 + f.reflected.s2), p = 2 * f.reflected.p2 / (1 + f.reflected.p2);
-  const double sign = f.reflected.real < 0 ? -1 : 1;
-  f.reflected = {s, p, sign * std::sqrt(s * p), 0};
-  f.transmitted = {1 - s, 1 - p, std::sqrt((1 - s) * (1 - p)), 0};
-  return f;
-}
-
-glm::dvec3 perpendicular(glm::dvec3 direction) {
-  const glm::dvec3 axis = std::abs(direction.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
-  return glm::normalize(glm::cross(direction, axis));
-}
-
-// Exits of one direction become one, as long as there are few of them: sections of flat faces have few.
-void add_exit(std::vector<Exit>& exits, glm::dvec3 direction, double flux) {
-  for (Exit& exit : std::span(exits).first(std::min(exits.size(), kFewExits))) {
-    const glm::dvec3 apart = exit.direction - direction;
-    if (glm::dot(apart, apart) < kSameDirection * kSameDirection) {
-      exit.flux += flux;
-      return;
-    }
-  }
-  exits.push_back({direction, flux});
-}
-
-/// Follows all branches of the rays that start in one stratum of the period.
 class Tracer {
  public:
-  Tracer(const Section& section, const SectionOptions& options) : section_(section), options_(options) {}
+  Tracer(const Section& section, const TraceOptions& options, bool is_inward)
+      : section_(section),
+        profile_(section),
+        options_(options),
+        sobol_(options.seed),
+        weak_(options.split_share / std::max(options.ray_count, 1)),
+        exits(is_inward) {}
 
-  void trace(glm::dvec2 place, glm::dvec3 direction, std::uint64_t stream, SectionLight& light) {
-    is_inward_ = direction.z > 0;
-    branches_.assign(1, {place, direction, perpendicular(direction), {}, 0, stream});
-    while (!branches_.empty()) {
-      Branch branch = branches_.back();
-      branches_.pop_back();
-      if (branch.events > options_.maximum_events)
-        light.unfinished += branch.light.i;
-      else
-        follow(branch, light);
-    }
-  }
+  /// Follows wide beams to where they leave or become rays.
+  std::vector<Path> beams(const Path& first);
+  /// Follows rays; may be called for several at once with a sorter for each.
+  void ray(const Path& first, ExitSorter& sorter) const;
 
  private:
-  void follow(Branch& branch, SectionLight& light);
-  struct Way {
-    glm::dvec3 direction;
-    Stokes light;
+  struct Part {
+    double begin, end;
+    SectionProfile::Hit hit;
   };
-  void meet(const Branch& branch, const Line& line, SectionLight& light);
-  void divide(const Branch& branch, glm::dvec3 reference, const Way& a, const Way& b);
-  void scatter(const Branch& branch, glm::dvec3 normal, double flux);
-  void push(const Branch& from, glm::dvec3 direction, glm::dvec3 reference, const Stokes& light) {
-    if (light.i > 0)
-      branches_.push_back(
-          {from.place, direction, reference, light, from.events + 1, next_stream(from), from.is_random});
-  }
-  std::uint64_t next_stream(const Branch& from) {
-    ++pushed_;
-    return (static_cast<std::uint64_t>(hash_seed(from.stream, pushed_)) << 32) | hash_seed(from.stream + 1, pushed_);
-  }
+  void divide(const Path& beam);
+  std::vector<Part> parts(const Path& beam, const std::vector<double>& cuts) const;
+  void spread(const Path& beam, double begin, double end);
+  void go_on(const Path& path, const SectionProfile::Hit& hit, std::vector<Path>& onward, ExitSorter& sorter) const;
 
   const Section& section_;
-  const SectionOptions& options_;
-  std::vector<Branch> branches_;
-  double crossed_ = 0;  // along the present path since its last line, in periods gone by
-  std::uint64_t pushed_ = 0;
-  bool is_inward_ = true;  // the incident light comes from outdoors
+  const SectionProfile profile_;
+  const TraceOptions& options_;
+  const SobolSequence sobol_;
+  const double weak_;
+  std::vector<Path> stack_, rays_;
+
+ public:
+  ExitSorter exits;
 };
 
-double cross2(glm::dvec2 a, glm::dvec2 b) {
-  return a.x * b.y - a.y * b.x;
-}
-
-// To the nearest of: a line, the border of the period (and in again at the other), or the planes, where light leaves.
-void Tracer::follow(Branch& branch, SectionLight& light) {
-  const glm::dvec2 along(branch.direction.y, branch.direction.z);
-  const double in_plane = glm::length(along);
-  if (in_plane < 1e-12) {  // along the extrusion: never leaves
-    light.unfinished += branch.light.i;
-    return;
-  }
-  double nearest = 1e300;
-  const Line* met = nullptr;
-  const double close = kClose * section_.period / in_plane;
-  for (const Line& line : section_.lines) {
-    const glm::dvec2 edge = line.b - line.a;
-    const double denominator = cross2(along, edge);
-    if (denominator == 0) continue;
-    const glm::dvec2 to_start = line.a - branch.place;
-    const double t = cross2(to_start, edge) / denominator, s = cross2(to_start, along) / denominator;
-    if (t > close && t < nearest && s >= 0 && s <= 1) {
-      nearest = t;
-      met = &line;
-    }
-  }
-  const double border = along.x > 0   ? (section_.period - branch.place.x) / along.x
-                        : along.x < 0 ? -branch.place.x / along.x
-                                      : 1e300;
-  const double plane = along.y > 0   ? (section_.high_z - branch.place.y) / along.y
-                       : along.y < 0 ? (section_.low_z - branch.place.y) / along.y
-                                     : 1e300;
-  const double step = std::min({nearest, border, plane});
-  if (!(step < 1e299)) {
-    light.unfinished += branch.light.i;
-    return;
-  }
-  if (met && nearest <= step) {
-    // The medium that was crossed is the one on this side of the line.
-    const glm::dvec2 edge = met->b - met->a;
-    const int medium = cross2(edge, along) < 0 ? met->left : met->right;
-    const double absorption = section_.media[static_cast<std::size_t>(medium)].absorption;
-    if (absorption > 0) {
-      const double share = std::exp(-absorption * (crossed_ + step));
-      light.absorbed += (1 - share) * branch.light.i;
-      branch.light = Mueller{share, share, share, 0} * branch.light;
-    }
-    branch.place += step * along;
-    crossed_ = 0;
-    meet(branch, *met, light);
-    return;
-  }
-  branch.place += step * along;
-  if (plane <= border) {
-    crossed_ = 0;
-    std::vector<Exit>& exits = (branch.direction.z > 0) == is_inward_ ? light.transmitted : light.reflected;
-    if (branch.is_random)
-      exits.push_back({branch.direction, branch.light.i});
+std::vector<Path> Tracer::beams(const Path& first) {
+  stack_.assign(1, first);
+  while (!stack_.empty()) {
+    const Path path = stack_.back();
+    stack_.pop_back();
+    if (path.is_wide())
+      divide(path);
     else
-      add_exit(exits, branch.direction, branch.light.i);
-    return;
+      rays_.push_back(path);
   }
-  branch.place.x = along.x > 0 ? 0 : section_.period;
-  ++branch.events;
-  crossed_ += step;
-  if (branch.events > options_.maximum_events) {
-    crossed_ = 0;
-    light.unfinished += branch.light.i;
-    return;
-  }
-  follow(branch, light);
+  for (std::size_t k = 0; k < rays_.size(); ++k) rays_[k].number = static_cast<std::uint32_t>(k);
+  return std::move(rays_);
 }
 
-void Tracer::meet(const Branch& branch, const Line& line, SectionLight& light) {
-  const glm::dvec2 edge = glm::normalize(line.b - line.a);
-  const bool is_left = cross2(edge, {branch.direction.y, branch.direction.z}) < 0;
-  const glm::dvec3 normal = (is_left ? 1.0 : -1.0) * glm::dvec3(0, -edge.y, edge.x);
-  const double cosine = -glm::dot(branch.direction, normal);
-
-  // To the s and p axes of this meeting.
-  glm::dvec3 s = glm::cross(branch.direction, normal);
-  const double sine = glm::length(s);
-  s = sine > 1e-12 ? s / sine : branch.reference;
-  const Stokes incident =
-      turned(branch.light, glm::dot(branch.reference, s), glm::dot(glm::cross(branch.direction, branch.reference), s));
-  const glm::dvec3 mirrored = branch.direction + 2 * cosine * normal;
-
-  switch (line.kind) {
-    case LineKind::kInterface:
-    case LineKind::kGap: {
-      const double n1 = section_.media[static_cast<std::size_t>(is_left ? line.left : line.right)].index;
-      const double n2 = section_.media[static_cast<std::size_t>(is_left ? line.right : line.left)].index;
-      const bool is_gap = line.kind == LineKind::kGap;
-      const Fresnel f = is_gap ? thin_gap(n1, cosine) : fresnel(n1, n2, cosine);
-      const double ratio = n1 / n2;
-      const glm::dvec3 passed =
-          is_gap || f.is_total ? branch.direction
-                               : glm::normalize(ratio * branch.direction + (ratio * cosine - f.cosine_beyond) * normal);
-      divide(branch, s, {mirrored, f.reflected * incident}, {passed, f.transmitted * incident});
-      break;
+void Tracer::divide(const Path& beam) {
+  if (beam.light.i < weak_) {  // one ray of it, by chance
+    Path ray = beam;
+    ray.start = ray.end = beam.at(ray.chance());
+    rays_.push_back(ray);
+    return;
+  }
+  std::vector<double> cuts{0, 1};
+  if (beam.events > options_.maximum_events || glm::length(beam.along()) < kAlongAxis) {
+    exits.unfinished += beam.light.i;
+    return;
+  }
+  if (!profile_.cuts(beam.start, beam.end, beam.along(), cuts)) {
+    spread(beam, 0, 1);
+    return;
+  }
+  for (const Part& part : parts(beam, cuts)) {
+    const int line = part.hit.line;
+    if (line >= 0 && (profile_.is_arc(line) ||
+                      section_.lines[static_cast<std::size_t>(line)].surface.kind == SurfaceKind::kDiffuse)) {
+      spread(beam, part.begin, part.end);
+      continue;
     }
-    case LineKind::kMirror:
-    case LineKind::kDiffuse: {
-      const double open = line.openness, closed = 1 - open;
-      const double rho = closed * (is_left ? line.reflectance : line.reflectance_right);
-      const Way through{branch.direction, Mueller{open, open, open, 0} * incident};
-      double used = open + rho;
-      if (line.kind == LineKind::kMirror) {
-        divide(branch, s, through, {mirrored, Mueller{rho, rho, -rho, 0} * incident});
-      } else {
-        const double tau = closed * line.transmittance;
-        used += tau;
-        if (incident.i >= options_.split_share) {
-          push(branch, through.direction, s, through.light);
-          scatter(branch, normal, rho * incident.i);
-          scatter(branch, -normal, tau * incident.i);
-        } else if (used > 0) {  // one way by chance, with the flux of all
-          const double choice = used * hash_seed(next_stream(branch), 0) / 4294967296.0;
-          const double scale = used / std::max(open, 1e-300);
-          if (choice < open)
-            push(branch, through.direction, s, Mueller{scale, scale, scale, 0} * through.light);
-          else
-            scatter(branch, choice < open + rho ? normal : -normal, used * incident.i);
-        }
-      }
-      light.absorbed += (1 - used) * incident.i;
-      break;
-    }
+    Path piece = beam;
+    piece.start = beam.at(part.begin);
+    piece.end = beam.at(part.end);
+    piece.light = (part.end - part.begin) * beam.light;
+    piece.stream ^= static_cast<std::uint64_t>(hash_seed(beam.stream, static_cast<std::uint64_t>(part.begin * 1e15)));
+    go_on(piece, part.hit, stack_, exits);
   }
 }
 
-// Both ways, or one of them by chance with the flux of both.
-void Tracer::divide(const Branch& branch, glm::dvec3 reference, const Way& a, const Way& b) {
-  const double sum = a.light.i + b.light.i;
-  if (branch.light.i >= options_.split_share || a.light.i <= 0 || b.light.i <= 0) {
-    push(branch, a.direction, reference, a.light);
-    push(branch, b.direction, reference, b.light);
+// Neighbouring parts that meet the same line are one.
+std::vector<Tracer::Part> Tracer::parts(const Path& beam, const std::vector<double>& cuts) const {
+  std::vector<double> ordered;
+  for (const double cut : cuts)
+    if (cut >= 0 && cut <= 1) ordered.push_back(cut);
+  std::sort(ordered.begin(), ordered.end());
+  std::vector<Part> result;
+  double begin = 0;
+  for (const double end : ordered) {
+    if (end - begin < kThin && end < 1) continue;
+    const auto hit = profile_.nearest(beam.at(0.5 * (begin + end)), beam.along(), beam.from);
+    if (!result.empty() && result.back().hit.line == hit.line && result.back().hit.shift == hit.shift)
+      result.back().end = end;
+    else if (end > begin)
+      result.push_back({begin, end, hit});
+    begin = end;
+  }
+  return result;
+}
+
+void Tracer::spread(const Path& beam, double begin, double end) {
+  const double flux = (end - begin) * beam.light.i;
+  const int count = std::max(1, static_cast<int>(std::ceil(flux * options_.ray_count)));
+  for (int k = 0; k < count; ++k) {
+    Path ray = beam;
+    const std::uint64_t number = rays_.size();
+    const double jitter = (hash_seed(options_.seed, number) + 0.5) / 4294967296.0;
+    ray.start = ray.end = beam.at(begin + (end - begin) * (k + jitter) / count);
+    ray.light = ((end - begin) / count) * beam.light;
+    ray.stream = (static_cast<std::uint64_t>(hash_seed(options_.seed + 1, number)) << 32) | number;
+    rays_.push_back(ray);
+  }
+}
+
+void Tracer::go_on(const Path& path, const SectionProfile::Hit& hit, std::vector<Path>& onward,
+                   ExitSorter& sorter) const {
+  if (hit.line == SectionProfile::kNothing) {
+    sorter.unfinished += path.light.i;
     return;
   }
-  const bool takes_a = hash_seed(next_stream(branch), 0) / 4294967296.0 * sum < a.light.i;
-  const Way& way = takes_a ? a : b;
-  const double scale = sum / way.light.i;
-  push(branch, way.direction, reference, Mueller{scale, scale, scale, 0} * way.light);
+  if (hit.line == SectionProfile::kLeaves) {
+    sorter.add(path.direction, path.light.i, path.is_spread || path.is_scattered);
+    return;
+  }
+  const Line& line = section_.lines[static_cast<std::size_t>(hit.line)];
+  const glm::dvec2 along = path.along(), shift(hit.shift, 0);
+  const double near = path.is_wide() ? profile_.distance_to(hit, path.start, along) : hit.t;
+  const double far = path.is_wide() ? profile_.distance_to(hit, path.end, along) : hit.t;
+  Path next = path;
+  next.start = path.start + near * along - shift;
+  next.end = path.is_wide() ? path.end + far * along - shift : next.start;
+  next.from = hit.line;
+  ++next.events;
+  next.is_spread |= profile_.is_arc(hit.line);
+
+  const glm::dvec2 front = profile_.front_normal(hit.line, next.start);
+  const bool is_front = glm::dot(front, along) < 0;
+  const int medium = is_front ? line.surface.front : line.surface.back;
+  const double absorption = section_.media[static_cast<std::size_t>(medium)].absorption;
+  if (absorption > 0) {
+    const double share = mean_absorption(absorption, near, far);
+    sorter.absorbed += (1 - share) * next.light.i;
+    next.light = share * next.light;
+  }
+  const glm::dvec3 normal = (is_front ? 1.0 : -1.0) * glm::dvec3(0, front.x, front.y);
+  Meeting meeting = meet(line.surface, section_.media, path.direction, path.reference, next.light, normal, is_front);
+  sorter.absorbed += meeting.absorbed;
+  if (meeting.count > 1 && next.light.i < weak_) meeting.leave_one(next.chance());
+  for (int k = 0; k < meeting.count; ++k) {
+    const Way& way = meeting.ways[static_cast<std::size_t>(k)];
+    Path branch = next;
+    branch.direction = way.direction;
+    branch.history = hash_seed(next.history, static_cast<std::uint64_t>(k) +
+                                                 (static_cast<std::uint64_t>(hit.line) << 3) + (meeting.count << 20));
+    branch.reference = way.reference;
+    branch.light = way.light;
+    if (k > 0) branch.stream ^= static_cast<std::uint64_t>(hash_seed(next.stream, static_cast<std::uint64_t>(k))) << 20;
+    if (way.is_diffuse) {
+      const glm::dvec2 first = sobol_.point2(path.number);
+      const double u = path.is_scattered ? branch.chance() : static_cast<double>(first.x);
+      const double v = path.is_scattered ? branch.chance() : static_cast<double>(first.y);
+      branch.direction = lambertian_direction(way.direction, u, v);
+      branch.reference = perpendicular(branch.direction);
+      branch.is_scattered = true;
+    }
+    onward.push_back(branch);
+  }
 }
 
-void Tracer::scatter(const Branch& branch, glm::dvec3 normal, double flux) {
-  if (!(flux > 0)) return;
-  const std::uint64_t stream = next_stream(branch);
-  constexpr double kScale = 1.0 / 4294967296.0;
-  const double u = (hash_seed(stream, 1) + 0.5) * kScale, phi = 2 * std::numbers::pi * hash_seed(stream, 2) * kScale;
-  const double radius = std::sqrt(u);
-  const glm::dvec3 across = perpendicular(normal), up = glm::cross(normal, across);
-  const glm::dvec3 direction = glm::normalize(radius * std::cos(phi) * across + radius * std::sin(phi) * up +
-                                              std::sqrt(std::max(0.0, 1 - u)) * normal);
-  branches_.push_back({branch.place, direction, perpendicular(direction), {flux}, branch.events + 1, stream, true});
+void Tracer::ray(const Path& first, ExitSorter& sorter) const {
+  std::vector<Path> stack{first};
+  while (!stack.empty()) {
+    const Path path = stack.back();
+    stack.pop_back();
+    if (path.events > options_.maximum_events || glm::length(path.along()) < kAlongAxis)
+      sorter.unfinished += path.light.i;
+    else
+      go_on(path, profile_.nearest(path.start, path.along(), path.from), stack, sorter);
+  }
 }
 
 }  // namespace
@@ -316,63 +241,39 @@ void Section::validate() const {
   };
   if (!(period > 0) || !(high_z > low_z))
     throw InputError("the section has no extent: period and thickness must be > 0");
-  if (media.empty()) throw InputError("the section has no medium: the first is the air around it");
-  for (const Medium& medium : media)
-    if (!(medium.index >= 1) || !(medium.absorption >= 0))
-      throw InputError("a medium of the section has an index below 1 or a negative absorption");
-  const double slack = 1e-9 * period;
+  transom::validate(media);
   for (std::size_t k = 0; k < lines.size(); ++k) {
     const Line& line = lines[k];
-    for (const glm::dvec2 p : {line.a, line.b}) {
-      if (!(p.x >= -slack && p.x <= period + slack)) fail(k, "leaves the period");
-      if (!(p.y > low_z && p.y < high_z)) fail(k, "is not between the planes where light enters and leaves");
-    }
-    if (line.a == line.b) fail(k, "has no length");
-    const int count = static_cast<int>(media.size());
-    if (line.left < 0 || line.left >= count || line.right < 0 || line.right >= count) fail(k, "names no medium");
-    for (const double rho : {line.reflectance, line.reflectance_right})
-      if (!(rho >= 0 && line.transmittance >= 0 && rho + line.transmittance <= 1))
-        fail(k, "reflects and transmits more than it receives, or less than nothing");
-    if (!(line.openness >= 0 && line.openness <= 1)) fail(k, "has an openness outside 0..1");
+    for (const glm::dvec2 p : {line.a, line.b})
+      if (!(p.y > low_z && p.y < high_z && std::isfinite(p.x)))
+        fail(k, "is not between the planes where light enters and leaves");
+    const double chord = glm::length(line.b - line.a);
+    if (!(chord > 0)) fail(k, "has no length");
+    if (!(std::abs(line.bow) < 0.5 * chord)) fail(k, "bows by half of its chord or more");
+    const double middle = 0.5 * (line.a.y + line.b.y) + line.bow * (line.b.x - line.a.x) / chord;
+    if (!(middle > low_z && middle < high_z)) fail(k, "bows beyond the planes where light enters and leaves");
+    if (const char* fault = line.surface.fault(media.size())) fail(k, fault);
   }
 }
 
-SectionLight trace_section(const Section& section, glm::dvec3 direction, SectionOptions options) {
+ProductLight trace_section(const Section& section, glm::dvec3 direction, TraceOptions options) {
   section.validate();
   const double length = glm::length(direction);
   if (!(length > 0) || !std::isfinite(length) || direction.z == 0)
     throw InputError("light must be given a direction that is not along the panel");
   direction /= length;
-  const std::size_t count = static_cast<std::size_t>(std::max(options.ray_count, 1));
-  const std::size_t blocks = (count + kGrain - 1) / kGrain;
-  std::vector<SectionLight> parts(blocks);
   const double start_z = direction.z > 0 ? section.low_z : section.high_z;
+  Tracer tracer(section, options, direction.z > 0);
+  const std::vector<Path> rays =
+      tracer.beams({{0, start_z}, {section.period, start_z}, direction, perpendicular(direction), {}});
+  const std::size_t blocks = (rays.size() + kGrain - 1) / kGrain;
+  std::vector<ExitSorter> sorters(blocks, ExitSorter(direction.z > 0));
   parallel_indices(blocks, 1, [&](std::size_t block) {
-    Tracer tracer(section, options);
-    for (std::size_t i = block * kGrain; i < std::min(count, (block + 1) * kGrain); ++i) {
-      const double jitter = (hash_seed(options.seed, i) + 0.5) / 4294967296.0;
-      const double y = section.period * (static_cast<double>(i) + jitter) / static_cast<double>(count);
-      const std::uint64_t stream = (static_cast<std::uint64_t>(hash_seed(options.seed + 1, i)) << 32) | i;
-      tracer.trace({y, start_z}, direction, stream, parts[block]);
-    }
+    for (std::size_t k = block * kGrain; k < std::min(rays.size(), (block + 1) * kGrain); ++k)
+      tracer.ray(rays[k], sorters[block]);
   });
-  SectionLight light;
-  const double share = 1.0 / static_cast<double>(count);
-  bool is_specular = true;
-  for (const Line& line : section.lines) is_specular &= line.kind != LineKind::kDiffuse;
-  for (const SectionLight& part : parts) {
-    for (const auto& [from, to] :
-         {std::pair{&part.transmitted, &light.transmitted}, std::pair{&part.reflected, &light.reflected}})
-      for (const Exit& exit : *from) {
-        if (is_specular)
-          add_exit(*to, exit.direction, share * exit.flux);
-        else
-          to->push_back({exit.direction, share * exit.flux});
-      }
-    light.absorbed += share * part.absorbed;
-    light.unfinished += share * part.unfinished;
-  }
-  return light;
+  for (const ExitSorter& sorter : sorters) tracer.exits.append(sorter);
+  return tracer.exits.light();
 }
 
 }  // namespace transom

@@ -139,9 +139,9 @@ double scale_both_ways(SparseRows& exchange, const std::vector<double>& scale, c
       Share& entry = exchange.entries[k];
       const double shared = entry.weight * (scale[i] * scale[entry.index]);
       const auto forth = static_cast<float>(shared / areas[i]), back = static_cast<float>(shared / areas[entry.index]);
-      worst[i] = std::max(worst[i], std::abs(static_cast<double>(areas[i]) * forth -
-                                             static_cast<double>(areas[entry.index]) * back) /
-                                        std::max(areas[i], areas[entry.index]));
+      worst[i] = std::max(
+          worst[i], std::abs(static_cast<double>(areas[i]) * forth - static_cast<double>(areas[entry.index]) * back) /
+                        std::max(areas[i], areas[entry.index]));
       entry.weight = forth;
     }
   });

@@ -20,12 +20,11 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from transom.errors import InputError
+from transom.errors import InputError, invalid_field
 from transom.files import write_atomic
 from transom.judge import GOOD_ENOUGH_SHARE, Subject, ToleranceFile, coverage_factor
 from transom.measures import UP_CLOSE, Measure
 from transom.provenance import current_provenance
-from transom.suite import invalid_field
 
 BASELINE_FORMAT = 1
 

@@ -22,14 +22,14 @@ from pydantic import TypeAdapter, ValidationError
 from transom.bench_scenes import opening_face_count, with_other_glass, with_other_paint, with_panes
 from transom.bench_worker import SENSOR_RAYS, phase_seconds
 from transom.daylight.condition import resolve_condition
-from transom.errors import InputError
+from transom.errors import InputError, invalid_field
+from transom.fenestration.reglazing import load_glazed
 from transom.files import write_atomic
 from transom.machine_limits import BENCHMARKS, Limit, Utilisation, embree_rays, memory_copy, utilisations
 from transom.progress import CaseProgress
 from transom.provenance import Provenance, current_provenance
-from transom.scene import load_scene
 from transom.scene.model import Scene
-from transom.suite import invalid_field, resized
+from transom.suite import resized
 from transom.timing import peak_memory_mib
 
 SCHEMA_FILE = Path(__file__).resolve().parents[2] / "reports" / "bench.schema.json"
@@ -147,14 +147,18 @@ class PointResult:
     utilisations: tuple[Utilisation, ...]
 
 
-def bench_scene(name: str, progress: CaseProgress, *, budget_s: float, quick: bool = False) -> Bench:
+def bench_scene(
+    name: str, progress: CaseProgress, *, budget_s: float, quick: bool = False, glazings: Sequence[str] = ()
+) -> Bench:
     """Times a scene at its default settings, then over patches and openings, for about `budget_s` seconds.
 
     Every quantity is repeated at least twice (a solve at least once), so that a large scene may take longer; what is
-    no longer begun is named in `left_out`. Raises InputError for a scene that cannot be solved.
+    no longer begun is named in `left_out`. glazings: other glazing than the scene's (transom.fenestration.reglazing).
+    Raises InputError for a scene that cannot be solved.
     """
     began, load = time.monotonic(), os.getloadavg()[0]
-    points = bench_points(load_scene(name), quick)
+    scene = load_glazed(name, glazings)
+    points = bench_points(scene, quick)
     measurements: list[Measurement] = []
     limits: tuple[Limit, ...] = ()
     used: tuple[Utilisation, ...] = ()
@@ -168,7 +172,7 @@ def bench_scene(name: str, progress: CaseProgress, *, budget_s: float, quick: bo
             continue
         share = max(remaining, 0.0) / (len(points) - index) * (2 if index == 0 else 1)
         try:
-            found = in_own_process(measure_point, name, point, share)
+            found = in_own_process(measure_point, name, point, share, tuple(glazings))
         except InputError as error:
             if index == 0:
                 raise
@@ -183,7 +187,7 @@ def bench_scene(name: str, progress: CaseProgress, *, budget_s: float, quick: bo
     return Bench(
         format=1,
         created=datetime.now(UTC).replace(microsecond=0),
-        scene=load_scene(name).name,
+        scene=scene.name,
         engine_build=in_own_process(_engine_build),
         budget_s=budget_s,
         load_average=(load, os.getloadavg()[0]),
@@ -207,13 +211,13 @@ def bench_points(scene: Scene, quick: bool) -> list[Point]:
     return points
 
 
-def measure_point(name: str, point: Point, budget_s: float) -> PointResult:
+def measure_point(name: str, point: Point, budget_s: float, glazings: Sequence[str] = ()) -> PointResult:
     """All quantities of one point, in this process. Sweeps are of solve, relighting, frame and memory alone."""
     from transom.engine import Engine, SolveOptions
 
     whole = point.sweep == "default"
-    loads = _repeated(lambda _: load_scene(name), 0.03 * budget_s)
-    scene = load_scene(name)
+    loads = _repeated(lambda _: load_glazed(name, glazings), 0.03 * budget_s)
+    scene = load_glazed(name, glazings)
     if point.sweep == "openings":
         scene = with_panes(scene, point.pane_split)
     options = SolveOptions(target_patch_count=point.target_patches) if point.target_patches else SolveOptions()
@@ -242,7 +246,9 @@ def measure_point(name: str, point: Point, budget_s: float) -> PointResult:
             seen = len(state["engine"].trace()) if "engine" in state else 0
             action(index)
             spans = state["engine"].trace()
-            phases.append(phase_seconds(spans if quantity in ("solve", "reglaze", "recolour") else spans[seen:], quantity))
+            phases.append(
+                phase_seconds(spans if quantity in ("solve", "reglaze", "recolour") else spans[seen:], quantity)
+            )
 
         seconds = _repeated(once, share * budget_s, least)
         rows.append(_measurement(quantity, point, seconds, phases, scene, state["engine"], beams, points, size))

@@ -113,7 +113,7 @@ def write_hall(folder: Path, scene: Scene) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     write_atomic(folder / "mesh.obj", ("\n".join(lines) + "\n").encode())
     materials = "".join(
-        f'[materials.{entry.name}]\nreflectance = [{", ".join(f"{value:g}" for value in entry.reflectance)}]\n'
+        f"[materials.{entry.name}]\nreflectance = [{', '.join(f'{value:g}' for value in entry.reflectance)}]\n"
         for entry in scene.materials
         if entry.opening < 0
     )
@@ -210,7 +210,9 @@ def _leaves(middle: Float64, count: int, generator: np.random.Generator) -> tupl
     second = np.cross(first, generator.normal(size=(count, 3)))
     second /= np.linalg.norm(second, axis=1, keepdims=True)
     angles = 2 * math.pi * np.arange(3) / 3
-    offset = (np.cos(angles)[:, None] * first[:, None] + np.sin(angles)[:, None] * second[:, None]) * edge / math.sqrt(3)
+    offset = (
+        (np.cos(angles)[:, None] * first[:, None] + np.sin(angles)[:, None] * second[:, None]) * edge / math.sqrt(3)
+    )
     faces = np.full((count, 4), -1, dtype=np.int32)
     faces[:, :3] = np.arange(3 * count, dtype=np.int32).reshape(count, 3)
     return (place[:, None] + offset).reshape(-1, 3), faces

@@ -10,7 +10,19 @@ from collections.abc import Callable
 
 import typer
 
-from transom.commands import benching, checking, judging, listing, picture, products, running, sensing, status, tracing
+from transom.commands import (
+    benching,
+    checking,
+    judging,
+    listing,
+    picture,
+    plotting,
+    products,
+    running,
+    sensing,
+    status,
+    tracing,
+)
 from transom.errors import InputError
 
 WRONG_USE = 2
@@ -33,6 +45,7 @@ app = typer.Typer(
 COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
     "render": (picture.render, "One picture of a scene, as .exr or .png."),
     "sensors": (sensing.sensors, "Illuminance at points, as .csv."),
+    "plot": (plotting.plot, "Illuminance over hour and day, or over facet angles."),
     "run": (running.run, "Render, compare and judge a suite; or the references."),
     "status": (status.status, "The state of every case of a suite."),
     "compare": (judging.compare, "Compare a suite's runs with their references."),

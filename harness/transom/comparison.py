@@ -14,11 +14,10 @@ from scipy import ndimage
 
 from transom.colour import luminance
 from transom.compare import ImageComparison, SensorComparison
-from transom.errors import InputError
+from transom.errors import InputError, invalid_field
 from transom.files import write_atomic
 from transom.judge import Missing, Subject
 from transom.renderer import ImageResult
-from transom.suite import invalid_field
 from transom.visible import EXTERIOR
 
 COMPARISON_FORMAT = 1

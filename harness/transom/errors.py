@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
 
 
 class InputError(Exception):
@@ -30,3 +34,11 @@ class InputError(Exception):
 
 class StorageError(InputError):
     """A file that cannot be written: the disk is full, or the folder read-only. Going on would lose work."""
+
+
+def invalid_field(error: ValidationError, path: Path) -> InputError:
+    """The first problem of a malformed file as one line: its place, the value found, what is allowed."""
+    first = error.errors()[0]
+    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]).lstrip(".")
+    value = None if first["type"] == "missing" else first["input"]
+    return InputError(f"is refused: {first['msg']}", file=path, field=place or "file", value=value)

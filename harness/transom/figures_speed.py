@@ -83,8 +83,8 @@ GROWTH: tuple[tuple[str, str, str, str], ...] = (
 
 
 def growth_figure(found: Growth, file_format: Literal["svg", "png"] = "svg") -> bytes:
-    """Time [s], above, and peak memory [MiB], below, over patches, openings and triangles of the growing hall. The dotted
-    line grows in proportion."""
+    """Time [s], above, and peak memory [MiB], below, over patches, openings and triangles of the growing hall. The
+    dotted line grows in proportion."""
     from matplotlib.figure import Figure
 
     with mpl.rc_context(_SETTINGS):

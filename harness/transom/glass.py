@@ -57,8 +57,11 @@ def transmittance_table(opening: Opening) -> Float32:
     """Directional transmittance of the opening at cos(theta) = i / 1024, shape (1025,), 0..1.
 
     theta is the angle of incidence outside the pane. Every renderer interpolates linearly (`transmittance`).
-    Unglazed openings pass everything. Raises InputError for a transmittance that a pane cannot have.
+    Unglazed openings pass everything, products nothing straight: what they pass is in transom.fenestration.
+    Raises InputError for a transmittance that a pane cannot have.
     """
+    if opening.glazing == "product":
+        return np.zeros(TABLE_SIZE, dtype=np.float32)
     if opening.glazing == "none":
         return np.ones(TABLE_SIZE, dtype=np.float32)
     cosine = np.linspace(0.0, 1.0, TABLE_SIZE)

@@ -19,6 +19,7 @@ import tomllib
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from fnmatch import fnmatchcase
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -27,8 +28,7 @@ from typing import Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from scipy import stats
 
-from transom.errors import InputError
-from transom.suite import invalid_field
+from transom.errors import InputError, invalid_field
 
 GOOD_ENOUGH_SHARE = 1 / 3
 """A reference can judge when k u is at most this share of the tolerance."""
@@ -87,6 +87,8 @@ EXIT_PRIORITY = (4, 2, 1, 3, 0)
 class Tolerance(BaseModel):
     """One rule of tolerances.toml: a bound on a quantity, why, and what it applies to (nothing: everything).
 
+    Places are names or shell patterns, such as scene "test_room-*" for every variant of test_room.
+
     aims: stricter bounds, falling, that are not judged: whether they would hold is said beside the verdict.
     """
 
@@ -119,7 +121,8 @@ class Tolerance(BaseModel):
 
     def applies(self, subject: Subject) -> bool:
         return self.quantity == subject.quantity and all(
-            getattr(self, name) in (None, getattr(subject, name)) for name in SELECTORS
+            getattr(self, name) is None or fnmatchcase(getattr(subject, name), getattr(self, name))
+            for name in SELECTORS
         )
 
 

@@ -13,7 +13,7 @@ from transom.known.suite import run_known_references
 from transom.progress import CaseProgress
 from transom.renderer import Renderer, load_renderer
 from transom.run import Question, free_first, reference_questions, render_case
-from transom.suite import load_suite, read_suites
+from transom.suite import is_of_scenes, load_suite, read_suites
 
 REFERENCE_RENDERER = "mitsuba"
 
@@ -33,7 +33,7 @@ def published_questions(scenes: Collection[str] = ()) -> list[Question]:
             continue
         for question in reference_questions(load_suite(name), renderer, {}):
             known = questions.get(question.case.key)
-            if (not scenes or question.case.scene.name in scenes) and (known is None or _stricter(question, known)):
+            if is_of_scenes(question.case.scene, scenes) and (known is None or _stricter(question, known)):
                 questions[question.case.key] = question
     return list(questions.values())
 

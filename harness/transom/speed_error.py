@@ -31,7 +31,8 @@ from pydantic import TypeAdapter, ValidationError
 from transom.bundle import find_bundle, make_case
 from transom.compare import CaseNames, compare_region
 from transom.daylight.condition import Condition, resolve_condition
-from transom.errors import InputError
+from transom.errors import InputError, invalid_field
+from transom.fenestration.reglazing import reglazed
 from transom.files import write_atomic
 from transom.machine_limits import Limit, memory_copy
 from transom.progress import CaseProgress
@@ -41,7 +42,7 @@ from transom.renderer import RENDERERS, ImageResult, load_renderer
 from transom.scene import load_scene
 from transom.scene.model import ConditionSpec, Scene, View
 from transom.speed_ratio import SpeedUp, dominated, speed_ups
-from transom.suite import choose, invalid_field, resized
+from transom.suite import choose, resized
 from transom.visible import INTERIOR, region_masks
 
 SCHEMA_FILE = Path(__file__).resolve().parents[2] / "reports" / "speed_error.schema.json"
@@ -171,13 +172,14 @@ def measure_speed_error(
     condition: str | None = None,
     quick: bool = False,
     settings: Sequence[Setting] = SETTINGS,
+    glazings: Sequence[str] = (),
 ) -> SpeedError:
     """Runs every setting, each in new processes. Names None: the scene's first. What cannot run is listed as missing.
 
     Raises InputError where the view has no stored reference in that condition.
     """
     load = os.getloadavg()[0]
-    task = make_task(load_scene(name), view, condition)
+    task = make_task(reglazed(load_scene(name), glazings), view, condition)
     task, reference, key, facts = _with_reference(task)
     names = CaseNames(
         scene=task.scene.name,
@@ -241,7 +243,7 @@ def time_program(name: str, task: Task, setting: Setting, seed: int, hours: int)
     if "seed" in options:
         options["seed"] = seed
     begin = time.perf_counter()
-    scene = load_scene(name)
+    scene = reglazed(load_scene(name), task.scene.glazings)
     picture = renderer.render(scene, task.condition, task.view, options)
     cold = time.perf_counter() - begin
     seconds: list[float] = []
@@ -321,7 +323,7 @@ def _time_engine(name: str, task: Task, setting: Setting, hours: int) -> Timed:
 
     options = SolveOptions(method=ENGINE_METHODS[setting.program], **setting.options)
     begin = time.perf_counter()
-    engine = Engine.solve(load_scene(name), options)
+    engine = Engine.solve(reglazed(load_scene(name), task.scene.glazings), options)
     engine.relight(task.condition)
     picture = engine.render(task.view).radiance
     cold = time.perf_counter() - begin

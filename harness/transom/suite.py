@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from transom.daylight.condition import Condition, resolve_condition
-from transom.errors import InputError
+from transom.errors import InputError, invalid_field
+from transom.fenestration.reglazing import reglazed
 from transom.scene import load_scene, scene_root
 from transom.scene.model import ConditionSpec, Scene, View
 
@@ -20,13 +22,17 @@ Named = TypeVar("Named", View, ConditionSpec)
 
 
 class CaseEntry(BaseModel):
-    """Views and conditions of one scene: names, "*" for all, or omitted for the scene's first."""
+    """Views and conditions of one scene: names, "*" for all, or omitted for the scene's first.
+
+    glazing: OPENING=GLAZING, as on the command line: the case is of that variant of the scene.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
     scene: str
     views: list[str] | None = None
     conditions: list[str] | None = None
+    glazing: list[str] = []
     sensors: bool = True
 
 
@@ -153,21 +159,18 @@ def choose(entries: Sequence[Named], names: Sequence[str] | None, scene: Scene, 
     return tuple(by_name[name] for name in names)
 
 
+def is_of_scenes(scene: Scene, names: Collection[str]) -> bool:
+    """Whether the scene, or the one that it is a variant of, is among names or shell patterns. No names: yes."""
+    return not names or any(fnmatchcase(own, name) for own in (scene.name, scene.variant_of) for name in names)
+
+
 def resized(view: View, width: int, height: int | None = None) -> View:
     """The view at another size; without `height` it keeps its proportions."""
     return dataclasses.replace(view, width=width, height=height or max(1, round(width * view.height / view.width)))
 
 
-def invalid_field(error: ValidationError, path: Path) -> InputError:
-    """The first problem of a malformed file as one line: its place, the value found, what is allowed."""
-    first = error.errors()[0]
-    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]).lstrip(".")
-    value = None if first["type"] == "missing" else first["input"]
-    return InputError(f"is refused: {first['msg']}", file=path, field=place or "file", value=value)
-
-
 def _cases(line: CaseEntry, width: int | None, method: str) -> list[SuiteCase]:
-    scene = load_scene(line.scene)
+    scene = reglazed(load_scene(line.scene), line.glazing)
     views = choose(scene.views, line.views, scene, "view")
     if width is not None:
         views = tuple(resized(view, width) for view in views)

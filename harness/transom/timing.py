@@ -14,9 +14,10 @@ from typing import Literal
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
+from transom.errors import invalid_field
 from transom.files import write_atomic
 from transom.scene.model import ConditionSpec, Scene
-from transom.suite import invalid_field, resized
+from transom.suite import resized
 
 SOLVE_REPEATS, RELIGHT_REPEATS, FRAME_REPEATS = 3, 32, 32
 LEAST_REPEATS = 2

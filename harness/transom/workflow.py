@@ -44,7 +44,7 @@ from transom.run import (
 from transom.scene import scene_root
 from transom.scene.model import View
 from transom.sensor_file import SensorTable, scene_sensors
-from transom.suite import Suite, SuiteCase, load_suite
+from transom.suite import Suite, SuiteCase, is_of_scenes, load_suite
 from transom.visible import region_masks
 
 VISIBILITIES = ("volumes", "rays")
@@ -85,7 +85,7 @@ def run_suite(name: str, scenes: Collection[str], build: Path = Path("build"), *
 
 def chosen(suite: Suite, scenes: Collection[str]) -> Suite:
     """The suite's cases of some scenes (none given: all). Raises InputError when none is left."""
-    cases = tuple(case for case in suite.cases if not scenes or case.scene.name in scenes)
+    cases = tuple(case for case in suite.cases if is_of_scenes(case.scene, scenes))
     known = tuple(name for name in suite.known if not scenes or name in scenes)
     if not cases and not known:
         raise InputError(f"is no scene of suite {suite.name}", field="--scene", value=", ".join(sorted(scenes)))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from transom_reference.mitsuba_setup import dr, floats, mi
+from transom_reference.panels import PanelSide, panel_side, residual
 from transom_reference.surface import gather4, offset
 from transom_reference.transport_scene import SKY_ROWS, TABLE_INTERVALS, TransportScene
 
@@ -22,7 +23,10 @@ class LightAlong:
 
     def __init__(self, scene: TransportScene) -> None:
         self.scene = scene
-        self.sun_probability = floats(scene.sun_portal_probability) if scene.portals else None
+        if scene.sun_direction is not None:
+            self.sun_direction = mi.Vector3f(*map(float, scene.sun_direction))
+            dr.make_opaque(self.sun_direction)
+        self.sun_probability = floats(scene.sun_starts_probability) if scene.portals else None
         if scene.portals:
             points = np.stack([portal.weight_points for portal in scene.portals])
             self.weight_points = floats(points)
@@ -105,7 +109,7 @@ class LightAlong:
             point = origin + found.t * direction
             if viewer is not None:
                 here, normal, weight_sum = viewer
-                added = self._density_of(portal, point, along, here, normal, weight_sum, hit)
+                added = self.density_at(portal, point, along, here, normal, weight_sum, hit)
                 density = density + dr.select(hit, added, 0.0)
             elif sun:
                 area = gather4(scene.portal_table, portal * 4, hit).w
@@ -165,6 +169,12 @@ class LightAlong:
         passed, probability, density = self._panes(origin, direction, mi.Float(dr.inf), active, viewer, False)
         return dr.select(active, passed, 0.0), probability, density
 
+    def unhindered(self, origin: Any, direction: Any, active: Any) -> tuple[Any, Any]:
+        """Transmittance to the sky (0: hidden) and a ray's probability of passing."""
+        active = self._clear(origin, direction, mi.Float(dr.inf), active)
+        passed, probability, _ = self._panes(origin, direction, mi.Float(dr.inf), active, None, False)
+        return dr.select(active, passed, 0.0), probability
+
     def between(self, origin: Any, direction: Any, distance: Any, active: Any) -> tuple[Any, Any]:
         """Transmittance between two points (0: hidden) and the probability that a path's ray passes."""
         length = distance * (1.0 - 1e-5)
@@ -172,17 +182,56 @@ class LightAlong:
         passed, probability, _ = self._panes(origin, direction, length, active, None, False)
         return dr.select(active, passed, 0.0), probability
 
+    # -- products -------------------------------------------------------------------------------------------------
+
+    def panel_at(self, triangle: Any, direction: Any, active: Any) -> PanelSide:
+        """The panel's room side at a hit of the whole scene; lanes where there is none are not active in it."""
+        portal = dr.gather(mi.UInt32, self.scene.portal_of_glass_triangle, triangle - self.scene.opaque_count, active)
+        assert self.scene.panels is not None
+        return panel_side(self.scene.panels, portal, direction, active)
+
+    def panel_sun(self, side: PanelSide, point: Any, normal: Any) -> Any:
+        """Radiance of the sun's residual at a point of a panel as far as the sun reaches it, RGB; normal: outwards."""
+        panels = self.scene.panels
+        assert panels is not None
+        if self.scene.sun_direction is None or not panels.residual.any():
+            return mi.Color3f(0.0)
+        radiance = residual(panels, side)
+        lit = side.active & (dr.max(radiance) > 0.0)
+        passed, _ = self.sun(offset(point, normal), self.sun_direction, lit)
+        return dr.select(lit, radiance * passed, 0.0)
+
+    def beam(self, origin: Any, index: Any, active: Any) -> tuple[Any, Any]:
+        """How much of a panel beam reaches a point, and the density with which lit points are made, per m² of beam.
+
+        The first thing met against the beam must be the room side of a panel of its group; from there on it is the sun.
+        """
+        scene, panels = self.scene, self.scene.panels
+        assert panels is not None
+        row = gather4(panels.beam_table, index * 2, active)
+        against = -mi.Vector3f(row.xyz)
+        found = scene.all.ray_intersect_preliminary(mi.Ray3f(origin, against), active=active)
+        hit = active & found.is_valid() & (found.prim_index >= scene.opaque_count)
+        portal = dr.gather(mi.UInt32, scene.portal_of_glass_triangle, found.prim_index - scene.opaque_count, hit)
+        normal = gather4(scene.portal_table, portal * 4 + 3, hit).xyz
+        along = dr.dot(normal, against)
+        hit &= (along > 0.0) & (dr.gather(mi.Float, panels.portal_group, portal, hit) == row.w)
+        passed, _ = self.sun(offset(origin + found.t * against, normal), self.sun_direction, hit)
+        area = gather4(scene.portal_table, portal * 4, hit).w
+        chosen = dr.gather(mi.Float, self.sun_probability, (index + 1) * len(scene.portals) + portal, hit)
+        return dr.select(hit, passed, 0.0), dr.select(hit, chosen / (area * along), 0.0)
+
     # -- choosing an opening --------------------------------------------------------------------------------------
 
-    def portal_point(self, choice: Any, u: Any, v: Any, here: Any, normal: Any, active: Any) -> tuple[Any, Any]:
-        """A point on a portal chosen by weight, uniform in area, and the sum of weights at `here`."""
+    def portal_point(self, choice: Any, u: Any, v: Any, here: Any, normal: Any, active: Any) -> tuple[Any, Any, Any]:
+        """A portal chosen by weight, a point on it, uniform in area, and the sum of weights at `here`."""
         portal, weight = self._choose(choice, here, normal, active)
         corner = gather4(self.scene.portal_table, portal * 4, active)
         edge_u = gather4(self.scene.portal_table, portal * 4 + 1, active)
         edge_v = gather4(self.scene.portal_table, portal * 4 + 2, active)
         fold = (edge_u.w > 0.5) & (u + v > 1.0)
         u, v = dr.select(fold, 1.0 - u, u), dr.select(fold, 1.0 - v, v)
-        return mi.Point3f(corner.xyz + u * edge_u.xyz + v * edge_v.xyz), weight
+        return portal, mi.Point3f(corner.xyz + u * edge_u.xyz + v * edge_v.xyz), weight
 
     def _choose(self, choice: Any, here: Any, normal: Any, active: Any) -> tuple[Any, Any]:
         count = len(self.scene.portals)
@@ -224,7 +273,7 @@ class LightAlong:
         points = [dr.gather(mi.Point3f, self.weight_points, portal * 4 + k, active) for k in range(4)]
         return _weight(points, outward, row.x, row.y, here, normal)
 
-    def _density_of(
+    def density_at(
         self, portal: Any, point: Any, along: Any, here: Any, normal: Any, weight_sum: Any, active: Any
     ) -> Any:
         """Solid-angle density with which `here` samples this portal at `point` [1/sr]; along: cosine to its normal."""
@@ -241,7 +290,7 @@ class LightAlong:
             return mi.Float(0.0)
         portal = dr.gather(mi.UInt32, self.scene.portal_of_glass_triangle, triangle - self.scene.opaque_count, active)
         along = dr.dot(gather4(self.scene.portal_table, portal * 4 + 3, active).xyz, direction)
-        return self._density_of(portal, point, along, here, normal, weight_sum, active)
+        return self.density_at(portal, point, along, here, normal, weight_sum, active)
 
 
 def _weight(points: list[Any], outward: Any, scale: Any, softening: Any, here: Any, normal: Any) -> Any:

@@ -17,6 +17,7 @@ import numpy as np
 from transom_reference.light_along import LightAlong
 from transom_reference.low_discrepancy import lane_seed, pair
 from transom_reference.mitsuba_setup import dr, floats, mi, points
+from transom_reference.panels import outward_direction, panel_side
 from transom_reference.sun_patches import morton, portal_starts
 from transom_reference.surface import gather4, offset, surface_at
 from transom_reference.transport_scene import TransportScene
@@ -120,7 +121,7 @@ def _starts(scene: TransportScene, light: LightAlong, arriving: Arriving, seed: 
     """Origins, directions into the room, flux [lm, rgb] and whether it is the sun's, by lane."""
     areas = np.array([portal.area for portal in scene.portals])
     sky_flux = np.pi * areas * np.maximum(scene.portal_weights, 1e-3)
-    sun_flux = scene.sun_portal_flux
+    sun_flux = scene.sun_starts_flux
     beam_flux = float(scene.sun_illuminance.max() * sun_flux.sum())
     sun_share = beam_flux / (beam_flux + sky_flux.sum())
     sun_count = int(np.clip(round(sun_share * PATH_COUNT), PATH_COUNT // 16, PATH_COUNT)) if sun_flux.any() else 0
@@ -135,31 +136,51 @@ def _starts(scene: TransportScene, light: LightAlong, arriving: Arriving, seed: 
     outward = mi.Vector3f(mi.Frame3f(chosen).to_world(local))
     place = mi.Point3f(*points(start))
     weight = np.pi * areas * sky_flux.sum() / (sky_flux * sky_count)
-    radiance = arriving(offset(place, chosen), outward, seed)
     opening = np.array([entry.opening for entry in scene.portals])
     passed = light.transmittance(mi.UInt32(floats(opening[portal])), local.z, True)
-    flux = radiance * passed * floats(weight[portal])
+    if scene.panels is None:
+        flux = arriving(offset(place, chosen), outward, seed) * passed * floats(weight[portal])
+    else:
+        side = panel_side(scene.panels, mi.UInt32(floats(portal)), outward, dr.full(mi.Bool, True, sky_count))
+        numbers = floats(generator.random(sky_count)), floats(generator.random(sky_count))
+        came_from = dr.select(side.active, outward_direction(scene.panels, side, *numbers), outward)
+        radiance = arriving(offset(place, chosen), came_from, seed) * dr.select(side.active, side.share, passed)
+        flux = (radiance + light.panel_sun(side, place, chosen)) * floats(weight[portal])
     origin, direction = offset(place, -chosen), -outward
     if sun_count == 0:
         return origin, direction, flux, mi.Bool(False)
 
-    start, portal = portal_starts(scene, scene.sun_portal_probability, sun_count, seed + 2)
+    start, row = portal_starts(scene, scene.sun_starts_probability, sun_count, seed + 2)
     sun = mi.Vector3f(*map(float, scene.sun_direction))  # type: ignore[arg-type]
     dr.make_opaque(sun)
-    chosen = mi.Normal3f(*points(normals[portal]))
+    chosen = mi.Normal3f(*points(normals[row % len(normals)]))
     place = mi.Point3f(*points(start))
     passed, _ = light.sun(offset(place, chosen), sun, dr.full(mi.Bool, True, sun_count))
-    share = sun_flux / (np.maximum(scene.sun_portal_probability, 1e-30) * sun_count)
+    share = sun_flux / (np.maximum(scene.sun_starts_probability, 1e-30) * sun_count)
     colour = mi.Color3f(*map(float, scene.sun_illuminance))
-    sun_lane_flux = colour * passed * floats(share[portal])
+    propagation = -sun
+    if scene.panels is not None:
+        propagation, colour = _beams_of(scene, row // len(scene.portals))
+    sun_lane_flux = colour * passed * floats(share[row])
     dr.eval(origin, direction, flux, sun_lane_flux)
     sun_origin = offset(place, -chosen)
     is_sun = dr.concat([dr.full(mi.Bool, False, sky_count), dr.full(mi.Bool, True, sun_count)])
     together = [
         [dr.concat([a, b + dr.zeros(mi.Float, sun_count)]) for a, b in zip(one, two, strict=True)]
-        for one, two in ((origin, sun_origin), (direction, -sun), (flux, sun_lane_flux))
+        for one, two in ((origin, sun_origin), (direction, propagation), (flux, sun_lane_flux))
     ]
     return mi.Point3f(*together[0]), mi.Vector3f(*together[1]), mi.Color3f(*together[2]), is_sun
+
+
+def _beams_of(scene: TransportScene, number: Any) -> tuple[Any, Any]:
+    """Direction of propagation and colour, as bright as the sun, of the straight sun (0) and of panel beams (1 ...)."""
+    assert scene.panels is not None
+    assert scene.sun_direction is not None
+    beams = scene.panels.beams
+    directions = np.stack([-scene.sun_direction, *(beam.direction for beam in beams)])
+    level = scene.sun_illuminance.max()
+    colours = np.stack([scene.sun_illuminance, *(beam.normal_rgb * level / beam.normal_rgb.max() for beam in beams)])
+    return mi.Vector3f(*points(directions[number])), mi.Color3f(*points(colours[number]))
 
 
 def _sorted(table: Any) -> Any:

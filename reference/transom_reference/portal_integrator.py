@@ -30,22 +30,12 @@ from transom_reference.light_along import LightAlong
 from transom_reference.light_vertices import LightVertices, connection_density
 from transom_reference.low_discrepancy import lane_seed, pair
 from transom_reference.mitsuba_setup import dr, floats, mi
+from transom_reference.panels import outward_direction
 from transom_reference.path_starts import GivenRays, SensorPoints, Start, indoors
-from transom_reference.resampling import resample
-from transom_reference.sun_patches import SunPatches, pilot_multiplicity, sun_disc_direction
+from transom_reference.sun_patches import SunPatches, pilot_multiplicity
 from transom_reference.surface import offset, surface_at
 from transom_reference.transport_scene import TransportScene
-
-INVERSE_PI = float(1.0 / np.pi)
-SUN_DIMENSION = 1 << 16
-"""Pair number of the place on the sun's disc at step 0: beyond those of all other choices."""
-
-DIMENSION_PAIRS = 6
-"""Pairs of numbers that one step of a path uses."""
-
-VERTEX_CANDIDATES = 8
-PATCH_CANDIDATES = 8
-"""Light vertices and sun patches among which one is chosen for a connection, by what it would bring if visible."""
+from transom_reference.vertex_light import DIMENSION_PAIRS, INVERSE_PI, Batch, Vertex, VertexLight
 
 
 @dataclass(frozen=True)
@@ -60,30 +50,6 @@ class PathOptions:
     max_depth: int
     roulette: float = 0.35
     connect: bool = True
-
-
-@dataclass(frozen=True)
-class Batch:
-    """What all paths of one batch share. seed: UInt32, opaque."""
-
-    seed: Any
-    patches: SunPatches | None
-    vertices: LightVertices | None
-
-
-@dataclass
-class Vertex:
-    """A diffuse point of a path, by lane. factor: throughput x reflectance / pi. indoors: connections apply."""
-
-    active: Any
-    point: Any
-    outside: Any
-    normal: Any
-    shading: Any
-    factor: Any
-    indoors: Any
-    step: Any
-    sample: Any
 
 
 class PortalIntegrator:
@@ -136,10 +102,6 @@ class _Paths:
         self, scene: TransportScene, light: LightAlong, start: Start, options: PathOptions, batch: Batch
     ) -> None:
         self.scene, self.light, self.start, self.options, self.batch = scene, light, start, options, batch
-        self.sun = mi.Vector3f(*map(float, scene.sun_direction)) if scene.sun_direction is not None else None
-        self.sun_illuminance = mi.Color3f(*map(float, scene.sun_illuminance))
-        if self.sun is not None:
-            dr.make_opaque(self.sun, self.sun_illuminance)
 
     def run(self, begins_indoors: NDArray[np.bool_] | None, connection_density: float) -> Any:
         """Sum of radiance (or illuminance) over samples for each lane, RGB."""
@@ -154,6 +116,9 @@ class _Paths:
             place = self.lane // (count // len(begins_indoors))
             self.begins_indoors = dr.gather(mi.Float, floats(begins_indoors), place) > 0.5
             dr.eval(self.begins_indoors)
+        self.vertex_light = VertexLight(
+            self.scene, self.light, self.batch, self.seed, self.options.log2_samples, self.connection_density
+        )
         zero = dr.zeros(mi.Point3f, count)
         state = (
             dr.full(mi.Bool, True, count),
@@ -216,9 +181,10 @@ class _Paths:
         escaped = ray_active & ~hit
         share = ray_density / (ray_density + portal_density)
         total = total + dr.select(escaped, throughput * light.beyond(direction, escaped) * share, 0.0)
-        if scene.mirror_table is not None and self.sun is not None:
+        if scene.mirror_table is not None and scene.sun_direction is not None:
             # A ray that a mirror has turned, or the camera's own: no vertex has looked for the sun along it.
-            total = total + dr.select(escaped & ~after_vertex & (step > 0), throughput * self._disc(direction), 0.0)
+            disc = self.vertex_light.sun_disc(direction)
+            total = total + dr.select(escaped & ~after_vertex & (step > 0), throughput * disc, 0.0)
 
         surface = surface_at(scene, found, direction, hit)
         point, normal, shading, reflectance = surface.point, surface.normal, surface.shading, surface.reflectance
@@ -228,12 +194,24 @@ class _Paths:
         choice, roulette = self._numbers(step, 0, sample)
         passed = light.transmittance(mi.UInt32(dr.maximum(surface.opening, 0.0)), dr.abs(surface.along), is_glass)
         room = dr.select(surface.along > 0.0, self._room(surface, is_glass), 0.0)
+        if scene.panels is not None:
+            panel = light.panel_at(found.prim_index, direction, is_glass & (surface.along > 0.0))
+            passed = dr.select(panel.active, panel.share, passed)
         through_probability = dr.select(room > 0.0, passed / (passed + room), 1.0)
         through = is_glass & (choice < through_probability)
         reflected = is_glass & ~through
         sampled = through & after_vertex
+        if scene.panels is not None:
+            sampled |= panel.active & after_vertex
         crossing = light.portal_density(found.prim_index, point, direction, last, last_normal, last_weight, sampled)
+        if scene.panels is not None:
+            # What a panel sends is sampled by points on that panel alone, whatever panes are before it.
+            portal_density = dr.select(panel.active, 0.0, portal_density)
         portal_density = portal_density + dr.select(sampled, crossing, 0.0)
+        if scene.panels is not None:
+            residual = light.panel_sun(panel, point, surface.face_normal)
+            share = ray_density / (ray_density + portal_density)
+            total = total + dr.select(panel.active, throughput * residual * share, 0.0)
         throughput = dr.select(through, throughput * passed / through_probability, throughput)
         throughput = dr.select(reflected, throughput / (1.0 - through_probability), throughput)
         ray_density = dr.select(through, ray_density * through_probability, ray_density)
@@ -259,21 +237,23 @@ class _Paths:
         here = Vertex(vertex, point, offset(point, normal), normal, shading, factor, inside, step, sample)
         # Area density with which the last vertex's ray finds this one
         arrival = ray_density * dr.abs(dr.dot(normal, direction)) / dr.maximum(dr.squared_norm(point - last), 1e-12)
-        if self.sun is not None:
-            total = total + self._sun_here(here, arrival, after_vertex & ~is_glass)
+        if scene.sun_direction is not None:
+            total = total + self.vertex_light.sun(here, arrival, after_vertex & ~is_glass)
+        if scene.panels is not None and scene.panels.beams:
+            total = total + self.vertex_light.beams(here, arrival, after_vertex & ~is_glass)
         if self.batch.vertices is not None:
             kept = dr.select(vertex & inside & after_vertex, arrival / (arrival + self.connection_density), 1.0)
             throughput = throughput * kept
             here.factor = factor * kept
-            total = total + self._light_vertex(here)
+            total = total + self.vertex_light.light_vertex(here)
         weight = mi.Float(0.0)
         if scene.portals:
-            found_light, weight = self._sky_by_portal(here)
+            found_light, weight = self.vertex_light.sky_by_portal(here)
             total = total + found_light
         if self.batch.patches is not None:
-            total = total + self._sun_patch(here)
+            total = total + self.vertex_light.sun_patch(here)
         if scene.point_source_count:
-            total = total + self._point_source(here)
+            total = total + self.vertex_light.point_source(here)
 
         # The next ray
         next_1, next_2 = self._numbers(step, 4, sample)
@@ -293,6 +273,13 @@ class _Paths:
         last = dr.select(vertex, point, last)
         last_normal = dr.select(vertex, shading, last_normal)
         last_weight = dr.select(vertex, weight, last_weight)
+
+        if scene.panels is not None:
+            # Beyond a panel light goes another way: nothing has been sampled along it.
+            bent = through & panel.active
+            direction = dr.select(bent, outward_direction(scene.panels, panel, next_1, next_2), direction)
+            last_normal = dr.select(bent, mi.Normal3f(0.0), last_normal)
+            last_weight = dr.select(bent, 0.0, last_weight)
 
         if scene.mirror_table is not None:
             # As from a camera: nothing has been sampled along a mirrored ray.
@@ -333,105 +320,3 @@ class _Paths:
         if self.scene.mirror_table is None:
             return surface.room
         return self.light.mirror(mi.UInt32(dr.maximum(surface.opening, 0.0)), dr.abs(surface.along), active)
-
-    def _disc(self, direction: Any) -> Any:
-        """Radiance of the sun's disc in a direction, 0 beside it."""
-        radius = self.scene.sun_radius_rad
-        # The chord is exact in float32 where the cosine is not.
-        inside = dr.squared_norm(direction - self.sun) < (2.0 * float(np.sin(0.5 * radius))) ** 2
-        return dr.select(inside, self.sun_illuminance * float(1.0 / (np.pi * np.sin(radius) ** 2)), 0.0)
-
-    def _sun_here(self, here: Vertex, arrival: Any, may_be_connected: Any) -> Any:
-        """Direct sun; with the ray's share by the balance heuristic where a connection could have brought it."""
-        sun = self.sun
-        if self.scene.sun_radius_rad > 0.0:
-            numbers = pair(self.seed, mi.UInt32(SUN_DIMENSION) + here.step, here.sample, self.options.log2_samples)
-            sun = sun_disc_direction(self.scene, *numbers)
-        cosine, true_cosine = dr.dot(here.shading, sun), dr.dot(here.normal, sun)
-        lit = here.active & (cosine > 0.0) & (true_cosine > 0.0)
-        passed, density = self.light.sun(here.outside, sun, lit)
-        share = mi.Float(1.0)
-        if self.batch.patches is not None:
-            connection = self.batch.patches.multiplicity * density * true_cosine
-            share = dr.select(may_be_connected & (density > 0.0), arrival / (arrival + connection), 1.0)
-        return dr.select(lit & (passed > 0.0), here.factor * self.sun_illuminance * (passed * cosine * share), 0.0)
-
-    def _sky_by_portal(self, here: Vertex) -> tuple[Any, Any]:
-        """Sky and ground through a sampled point of an opening, and the sum of the openings' weights."""
-        choice, _ = self._numbers(here.step, 1, here.sample)
-        u, v = self._numbers(here.step, 2, here.sample)
-        target, weight = self.light.portal_point(choice, u, v, here.point, here.shading, here.active)
-        towards, _, cosine, seen = _towards(here, target)
-        seen &= weight > 0.0
-        passed, through_probability, portal_density = self.light.outward(
-            here.outside, towards, here.point, here.shading, weight, seen
-        )
-        ray_density = cosine * INVERSE_PI * through_probability
-        seen = seen & (passed > 0.0) & (portal_density > 0.0)
-        arriving = self.light.beyond(towards, seen) * (passed * cosine / (portal_density + ray_density))
-        return dr.select(seen, here.factor * arriving, 0.0), weight
-
-    def _sun_patch(self, here: Vertex) -> Any:
-        """A point lit by the sun through an opening, connected to the vertex."""
-        patches = self.batch.patches
-        assert patches is not None
-        choice, number = self._numbers(here.step, 3, here.sample)
-
-        def candidate(part: int) -> tuple[Any, tuple[Any, ...]]:
-            place, normal, radiance, density = patches.choose((choice + part) * (1.0 / PATCH_CANDIDATES), here.active)
-            towards, squared, cosine, seen = _towards(here, place)
-            other_cosine = -dr.dot(normal, towards)
-            seen &= (other_cosine > 0.0) & (squared > 1e-8)
-            flow = cosine * other_cosine / squared
-            connection = patches.multiplicity * density
-            value = dr.max(radiance) * flow / (connection + flow * INVERSE_PI)
-            return dr.select(seen, value, 0.0), (towards, squared, flow, radiance, connection)
-
-        total, chosen, (towards, squared, flow, radiance, connection) = resample(candidate, PATCH_CANDIDATES, number)
-        seen = here.active & (chosen > 0.0)
-        passed, through_probability = self.light.between(here.outside, towards, dr.sqrt(squared), seen)
-        value = passed * flow / (connection + flow * INVERSE_PI * through_probability)
-        strength = value * patches.multiplicity * patches.valid_share * total / chosen
-        return dr.select(seen & (passed > 0.0), here.factor * radiance * strength, 0.0)
-
-    def _light_vertex(self, here: Vertex) -> Any:
-        """Light reflected indoors, except the sun's first reflection, by a light vertex with the connection's share."""
-        vertices = self.batch.vertices
-        assert vertices is not None
-        choice, number = self._numbers(here.step, 5, here.sample)
-        may = here.active & here.indoors
-
-        def candidate(part: int) -> tuple[Any, tuple[Any, ...]]:
-            place, normal, power = vertices.choose((choice + part) * (1.0 / VERTEX_CANDIDATES), may)
-            towards, squared, cosine, seen = _towards(here, place)
-            other_cosine = -dr.dot(normal, towards)
-            seen &= may & (other_cosine > 0.0) & (squared > 1e-8)
-            flow = cosine * other_cosine / squared
-            value = flow * self.connection_density / (self.connection_density + flow * INVERSE_PI)
-            return dr.select(seen, dr.max(power) * value, 0.0), (towards, squared, power)
-
-        total, chosen, (towards, squared, power) = resample(candidate, VERTEX_CANDIDATES, number)
-        ray = mi.Ray3f(here.outside, towards)
-        ray.maxt = dr.sqrt(squared) * (1.0 - 1e-5)
-        seen = may & (chosen > 0.0)
-        seen &= ~self.scene.all.ray_test(ray, active=seen)
-        return dr.select(seen, here.factor * (power / dr.max(power)) * total, 0.0)
-
-    def _point_source(self, here: Vertex) -> Any:
-        """One point source, chosen evenly."""
-        count = self.scene.point_source_count
-        _, choice = self._numbers(here.step, 1, here.sample)
-        index = dr.minimum(mi.UInt32(choice * count), count - 1) * 6
-        x, y, z, *power = (dr.gather(mi.Float, self.scene.point_sources, index + k, here.active) for k in range(6))
-        towards, squared, cosine, seen = _towards(here, mi.Point3f(x, y, z))
-        passed, _ = self.light.between(here.outside, towards, dr.sqrt(squared), seen)
-        return dr.select(seen, here.factor * mi.Color3f(*power) * (passed * cosine * count / squared), 0.0)
-
-
-def _towards(here: Vertex, place: Any) -> tuple[Any, Any, Any, Any]:
-    """Direction to a place, squared distance, cosine by the shading normal, and the lanes that the place may light."""
-    gap = mi.Vector3f(place - here.outside)
-    squared = dr.squared_norm(gap)
-    towards = gap * dr.rsqrt(squared)
-    cosine = dr.dot(here.shading, towards)
-    return towards, squared, cosine, here.active & (cosine > 0.0) & (dr.dot(here.normal, towards) > 0.0)

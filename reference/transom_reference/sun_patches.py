@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +20,10 @@ PILOT_SEED = 0x5EED
 
 SHARE = 8.0
 """Weight of connections against rays, in units of one point chosen evenly."""
+
+
+Reaches = Callable[[Any, Any], tuple[Any, Any]]
+"""(points, active) -> how much of the beam arrives there, and its density of starts, per m² across it."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +64,7 @@ class SunPatches:
 
 def pilot_multiplicity(scene: TransportScene, light: LightAlong) -> float:
     """Traced over lit points, or 0 when the sun lights nothing through any opening."""
-    if not scene.sun_portal_probability.any():
+    if not scene.sun_starts_probability.any():
         return 0.0
     _, count = _lit_points(scene, light, PILOT_SEED)
     return POINT_COUNT / count if count else 0.0
@@ -67,18 +72,44 @@ def pilot_multiplicity(scene: TransportScene, light: LightAlong) -> float:
 
 def _lit_points(scene: TransportScene, light: LightAlong, seed: int) -> tuple[Any, int]:
     assert scene.sun_direction is not None
-    start, _ = portal_starts(scene, scene.sun_portal_probability, POINT_COUNT, seed)
+    start, row = portal_starts(scene, scene.sun_starts_probability, POINT_COUNT, seed)
+    straight = int(np.searchsorted(row, len(scene.portals)))
+    parts = [_straight_points(scene, light, start[:straight], seed)] if straight else []
+    if straight < POINT_COUNT:
+        parts.append(_beam_points(scene, light, start[straight:], row[straight:] // len(scene.portals) - 1))
+    table = np.concatenate(parts)
+    table = table[table[:, 8:11].sum(axis=1) > 0]
+    return floats(table), len(table)
+
+
+def _straight_points(scene: TransportScene, light: LightAlong, start: Any, seed: int) -> Any:
+    """Points that the sun lights through clear openings, rows (N, 12); dark ones have no radiance."""
+    assert scene.sun_direction is not None
     sun = mi.Vector3f(*map(float, scene.sun_direction))
     colour = mi.Color3f(*map(float, scene.sun_illuminance))
     dr.make_opaque(sun, colour)
     if scene.sun_radius_rad > 0.0:
         generator = np.random.default_rng([seed & 0xFFFFFFFF, 0x5D15C])
         sun = sun_disc_direction(scene, floats(generator.random(POINT_COUNT)), floats(generator.random(POINT_COUNT)))
-    rows = _light(scene, light, mi.Point3f(*points(start)), sun, colour)
-    dr.eval(rows)
-    table = np.stack([np.array(part) for part in rows], axis=1)
-    table = table[table[:, 8:11].sum(axis=1) > 0]
-    return floats(table), len(table)
+
+    def reaches(outside: Any, hit: Any) -> tuple[Any, Any]:
+        return light.sun(outside, sun, hit)
+
+    return _light(scene, mi.Point3f(*points(start)), sun, colour, reaches)
+
+
+def _beam_points(scene: TransportScene, light: LightAlong, start: Any, beam: Any) -> Any:
+    """The same for the panels' beams; beam: index of each start."""
+    assert scene.panels is not None
+    directions = np.array([entry.direction for entry in scene.panels.beams])[beam]
+    colours = np.array([entry.normal_rgb for entry in scene.panels.beams])[beam]
+    index = mi.UInt32(floats(beam))
+
+    def reaches(outside: Any, hit: Any) -> tuple[Any, Any]:
+        return light.beam(outside, index, hit)
+
+    against = -mi.Vector3f(*points(directions))
+    return _light(scene, mi.Point3f(*points(start)), against, mi.Color3f(*points(colours)), reaches)
 
 
 def sun_disc_direction(scene: TransportScene, u: Any, v: Any) -> Any:
@@ -94,20 +125,24 @@ def sun_disc_direction(scene: TransportScene, u: Any, v: Any) -> Any:
 
 
 def portal_starts(scene: TransportScene, probability: Any, count: int, seed: int) -> tuple[Any, Any]:
-    """Points (count, 3) on the portals and their portals (count,): stratified, in Morton order within each portal."""
+    """Points (count, 3) on the portals, and the rows of `probability` that they are for (count,).
+
+    probability: by portal, or by beam and portal. Stratified, in Morton order within each row.
+    """
     generator = np.random.default_rng([seed & 0xFFFFFFFF, 0xB1A5])
     level = (np.arange(count) + generator.random(count)) / count
     cumulative = np.cumsum(probability)
-    portal = np.searchsorted(cumulative / cumulative[-1], level, side="right").clip(0, len(probability) - 1)
+    row = np.searchsorted(cumulative / cumulative[-1], level, side="right").clip(0, len(probability) - 1)
     u, v = generator.random(count), generator.random(count)
-    order = np.lexsort((morton(np.stack([u, v], axis=1)), portal))
-    portal, u, v = portal[order], u[order], v[order]
+    order = np.lexsort((morton(np.stack([u, v], axis=1)), row))
+    row, u, v = row[order], u[order], v[order]
+    portal = row % len(scene.portals)
     corner, edge_u, edge_v = (
         np.array([getattr(entry, part) for entry in scene.portals])[portal] for part in ("corner", "edge_u", "edge_v")
     )
     fold = np.array([entry.is_triangle for entry in scene.portals])[portal] & (u + v > 1)
     u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
-    return corner + u[:, None] * edge_u + v[:, None] * edge_v, portal
+    return corner + u[:, None] * edge_u + v[:, None] * edge_v, row
 
 
 def morton(places: Any) -> Any:
@@ -123,16 +158,18 @@ def morton(places: Any) -> Any:
     return code
 
 
-def _light(scene: TransportScene, light: LightAlong, start: Any, sun: Any, colour: Any) -> list[Any]:
-    """The first opaque surface down the beam from each start, and what the sun makes of it: twelve columns."""
+def _light(scene: TransportScene, start: Any, sun: Any, colour: Any, reaches: Reaches) -> Any:
+    """The first opaque surface down the beam from each start, and what the sun makes of it: rows of twelve."""
     found = scene.opaque.ray_intersect_preliminary(mi.Ray3f(start, -sun))
     hit = found.is_valid()
     surface = surface_at(scene, found, -sun, hit)
     normal, shading, reflectance = surface.normal, surface.shading, surface.reflectance
     outside = offset(surface.point, normal)
-    passed, density = light.sun(outside, sun, hit)
+    passed, density = reaches(outside, hit)
     cosine, true_cosine = dr.maximum(dr.dot(shading, sun), 0.0), dr.dot(normal, sun)
     lit = hit & (density > 0.0) & (true_cosine > 0.0)
     radiance = dr.select(lit, reflectance * colour * (passed * cosine * float(1 / np.pi)), 0.0)
     zero = dr.zeros(mi.Float, dr.width(normal))
-    return [*outside, density * true_cosine, *normal, zero, *radiance, zero]
+    rows = [*outside, density * true_cosine, *normal, zero, *radiance, zero]
+    dr.eval(rows)
+    return np.stack([np.array(part) for part in rows], axis=1)

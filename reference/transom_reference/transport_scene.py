@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 
 from transom.colour import luminance
 from transom.daylight.condition import Condition
-from transom.glass import diffuse_reflectance, pane, transmittance_table
+from transom.errors import InputError
+from transom.fenestration.light import room_reflectance
+from transom.glass import pane, transmittance_table
 from transom.scene.model import Mesh, Scene
 from transom_reference.mitsuba_setup import dr, floats, mi
+from transom_reference.panels import Panels, build_panels
 
 Float64 = NDArray[np.float64]
 Int32 = NDArray[np.int32]
@@ -71,6 +74,8 @@ class TransportScene:
     of the sun's disc, 0 for a point (matched physics). portal_of_glass_triangle: UInt32; the glass
     triangles are the last rows of `triangles`, after `opaque_count` others.
     portal_table: flat (P, 16): corner, area; edge_u, is_triangle; edge_v, weight; normal, opening.
+    panels: products in openings, or None. sun_starts_flux, sun_starts_probability: ((1 + beams) P,): by portal what the
+    sun sends straight through it, then what it sends in by each beam of the panels; flux for a sun of 1 lx [lm].
     """
 
     all: Any
@@ -91,13 +96,14 @@ class TransportScene:
     sky_rgb: Any
     sun_direction: Float64 | None
     sun_illuminance: Float64
-    sun_portal_flux: Float64
-    sun_portal_probability: Float64
+    sun_starts_flux: Float64
+    sun_starts_probability: Float64
     point_sources: Any
     point_source_count: int
     has_emitters: bool
     mirror_table: Any = None
     sun_radius_rad: float = 0.0
+    panels: Panels | None = None
 
 
 def find_portals(scene: Scene) -> tuple[Portal, ...]:
@@ -155,7 +161,9 @@ def sky_table(condition: Condition) -> NDArray[np.float32]:
     return np.asarray(values, dtype=np.float32)
 
 
-def _portal_weights(scene: Scene, condition: Condition, portals: tuple[Portal, ...], table: Any) -> Float64:
+def _portal_weights(
+    scene: Scene, condition: Condition, portals: tuple[Portal, ...], table: Any, panels: Panels | None
+) -> Float64:
     """Mean luminance that each portal sends indoors under the condition (cosine-weighted over directions) [cd/m²]."""
     generator = np.random.default_rng(1)
     u, v = generator.random(4096), generator.random(4096)
@@ -163,7 +171,7 @@ def _portal_weights(scene: Scene, condition: Condition, portals: tuple[Portal, .
     ground = float(luminance(np.asarray(condition.ground_luminance_rgb, dtype=np.float64)))
     glass = {index: transmittance_table(opening) for index, opening in enumerate(scene.openings)}
     weights = []
-    for portal in portals:
+    for index, portal in enumerate(portals):
         tangent = portal.edge_u / np.linalg.norm(portal.edge_u)
         frame = np.stack([tangent, np.cross(portal.normal, tangent), portal.normal])
         z = np.clip((local @ frame)[:, 2], -1.0, 1.0)
@@ -171,6 +179,9 @@ def _portal_weights(scene: Scene, condition: Condition, portals: tuple[Portal, .
         column = (np.arctan2(directions[:, 1], directions[:, 0]) / (2 * np.pi) * table.shape[1]).astype(int)
         row = np.clip(np.arccos(np.abs(z)) / (0.5 * np.pi) * SKY_ROWS, 0, SKY_ROWS).astype(int)
         radiance = np.where(z > 0, table[row, column % table.shape[1]], ground)
+        if panels is not None and panels.group_of_portal[index] >= 0:
+            weights.append(panels.mean_luminance(index, directions, radiance))
+            continue
         passed = np.interp(local[:, 2] * TABLE_INTERVALS, np.arange(TABLE_INTERVALS + 1), glass[portal.opening])
         weights.append(float((radiance * passed).mean()))
     return np.array(weights)
@@ -180,7 +191,12 @@ def build_transport_scene(scene: Scene, condition: Condition, *, full_physics: b
     """Tables and ray-tracing scenes of a scene under a condition; float32, coordinates of the scene.
 
     full_physics: the sun is a disc, and the room side of glass a mirror; else a point, and diffuse.
+    Raises InputError for full physics with a glazing product, whose room side is diffuse and whose sun is parallel.
     """
+    products = [entry.name for entry in scene.openings if entry.product is not None]
+    if full_physics and products:
+        problem = f"cannot be used with the product in opening {products[0]}"
+        raise InputError(problem, field="physics", value="full", remedy='Use "matched"')
     mesh = scene.mesh
     rows, source = mesh.triangles()
     material = mesh.face_material[source]
@@ -201,7 +217,7 @@ def build_transport_scene(scene: Scene, condition: Condition, *, full_physics: b
     triangle_table[:, 0:3], triangle_table[:, 3] = corner[:, 0], material
     triangle_table[:, 4:7], triangle_table[:, 7] = corner[:, 1] - corner[:, 0], smooth
     triangle_table[:, 8:11] = corner[:, 2] - corner[:, 0]
-    room = [diffuse_reflectance(entry) for entry in scene.openings]
+    room = [room_reflectance(entry) for entry in scene.openings]
     material_table = np.array(
         [
             [*entry.reflectance, entry.opening, *entry.luminance, room[entry.opening] if entry.opening >= 0 else 0.0]
@@ -209,7 +225,8 @@ def build_transport_scene(scene: Scene, condition: Condition, *, full_physics: b
         ]
     )
     table = sky_table(condition)
-    weights = _portal_weights(scene, condition, portals, table)
+    panels = build_panels(scene, condition, [int(source[portal.source_triangles[0]]) for portal in portals])
+    weights = _portal_weights(scene, condition, portals, table, panels)
     portal_table = np.array(
         [
             [*p.corner, p.area, *p.edge_u, p.is_triangle, *p.edge_v, w, *p.normal, p.opening]
@@ -220,7 +237,7 @@ def build_transport_scene(scene: Scene, condition: Condition, *, full_physics: b
     sun = condition.sun_direction
     illuminance = np.asarray(condition.sun_illuminance_rgb, dtype=np.float64)
     has_sun = sun is not None and bool((illuminance > 0).any())
-    sun_flux = _sun_flux(sun, portals, glass) if has_sun else np.zeros(len(portals))
+    sun_flux = _sun_flux(sun, portals, glass, panels, illuminance) if has_sun else np.zeros(len(portals))
     sources = np.array([[*s.position, *s.intensity] for s in scene.point_sources]).reshape(-1, 6)
     result = TransportScene(
         all=_ray_scene(mesh.vertices, rows[order]),
@@ -241,13 +258,14 @@ def build_transport_scene(scene: Scene, condition: Condition, *, full_physics: b
         sky_rgb=mi.Color3f(*(float(v) for v in condition.sky_rgb)),
         sun_direction=np.asarray(sun, dtype=np.float64) if has_sun else None,
         sun_illuminance=illuminance,
-        sun_portal_flux=sun_flux,
-        sun_portal_probability=sun_flux / sun_flux.sum() if sun_flux.any() else sun_flux,
+        sun_starts_flux=sun_flux,
+        sun_starts_probability=sun_flux / sun_flux.sum() if sun_flux.any() else sun_flux,
         point_sources=floats(sources),
         point_source_count=len(sources),
         has_emitters=any(max(entry.luminance) > 0 for entry in scene.materials),
         mirror_table=floats(_mirror_tables(scene)) if full_physics and scene.openings else None,
         sun_radius_rad=SUN_RADIUS_RAD if full_physics else 0.0,
+        panels=panels,
     )
     dr.make_opaque(result.ground, result.sky_rgb)
     return result
@@ -273,11 +291,23 @@ def _triangle_normals(mesh: Mesh) -> Float64:
     return normals
 
 
-def _sun_flux(sun: Any, portals: tuple[Portal, ...], glass: NDArray[Any]) -> Float64:
-    """Flux through each portal for a sun of 1 lx that nothing outdoors hides [lm]; 0 where it does not face the sun."""
+def _sun_flux(
+    sun: Any, portals: tuple[Portal, ...], glass: NDArray[Any], panels: Panels | None, illuminance: Float64
+) -> Float64:
+    """Flux through each portal for a sun of 1 lx that nothing outdoors hides [lm]; 0 where it does not face the sun.
+
+    Panels' beams follow, each over all portals.
+    """
     flux = np.zeros(len(portals))
     for index, portal in enumerate(portals):
         cosine = max(0.0, float(np.dot(portal.normal, sun)))
         passed = float(np.interp(cosine * TABLE_INTERVALS, np.arange(TABLE_INTERVALS + 1), glass[portal.opening]))
         flux[index] = cosine * portal.area * passed
-    return flux
+    if panels is None:
+        return flux
+    rows = [flux]
+    for beam in panels.beams:
+        along = np.array([-np.dot(portal.normal, beam.direction) * portal.area for portal in portals])
+        sent = along * beam.normal_rgb.max() / illuminance.max()
+        rows.append(np.where(panels.group_of_portal == beam.group, sent, 0.0))
+    return np.concatenate(rows)

@@ -48,8 +48,8 @@ TOP_LEVEL = {
     "tools",
 }
 
-REFERENCE_MAY_IMPORT = ("bundle", "colour", "daylight", "errors", "glass", "renderer", "scene")
-"""Modules of transom that references share with the engine's side: one scene, one sky, one glass."""
+REFERENCE_MAY_IMPORT = ("bundle", "colour", "daylight", "errors", "fenestration", "glass", "renderer", "scene")
+"""Modules of transom that references share with the engine's side: one scene, one sky, one glass, one product."""
 
 ENGINE_MAY_INCLUDE = {
     *(

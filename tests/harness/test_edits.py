@@ -22,7 +22,7 @@ from transom.errors import InputError
 from transom.scene import load_scene
 from transom.scene.model import Scene
 
-BOX = np.array([[0, 0, 0], [0.4, 0, 0], [0, 0.4, 0], [0, 0, 0.4]]) + [1.0, 1.0, 0.5]
+BOX = np.array([1.0, 1.0, 0.5]) + 0.4 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 BOX_FACES = np.array([[0, 2, 1, -1], [0, 1, 3, -1], [0, 3, 2, -1], [1, 2, 3, -1]])
 
 

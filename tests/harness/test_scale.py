@@ -16,7 +16,9 @@ from transom.scene.enclosure import TriangleRays
 from transom.scene.model import Scene
 from transom.timing import peak_memory_mib
 
-OPTIONS = SolveOptions(target_patch_count=400, patch_rays=256, patch_opening_rays=64, node_rays=128, node_opening_rays=64)
+OPTIONS = SolveOptions(
+    target_patch_count=400, patch_rays=256, patch_opening_rays=64, node_rays=128, node_opening_rays=64
+)
 
 
 def overcast_sensors(scene: Scene) -> tuple[np.ndarray, Engine]:

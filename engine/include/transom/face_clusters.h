@@ -28,7 +28,9 @@ class FaceClusters {
 
   int count() const { return static_cast<int>(begin_.size()) - 1; }
   /// Cluster of a side, or -1; and its element there.
-  int cluster_of(int face, Side side) const { return cluster_of_side_.empty() ? -1 : cluster_of_side_[2 * face + side]; }
+  int cluster_of(int face, Side side) const {
+    return cluster_of_side_.empty() ? -1 : cluster_of_side_[2 * face + side];
+  }
   int element_of(int face, Side side) const { return element_of_side_[2 * face + side]; }
 
   float area(int cluster) const { return area_[cluster]; }

@@ -26,7 +26,8 @@ struct Node {
   bool operator==(const Node&) const = default;
 };
 
-/// Grids over all faces but small ones, which are taken together: cells no longer than the face's maximum edge, each split into elements_per_edge^2 elements.
+/// Grids over all faces but small ones, which are taken together: cells no longer than the face's maximum edge, each
+/// split into elements_per_edge^2 elements.
 class LightMesh {
  public:
   LightMesh(const Faces& faces, const std::vector<float>& maximum_edges, int elements_per_edge,
@@ -35,8 +36,7 @@ class LightMesh {
   const Faces& faces() const { return *faces_; }
   /// Whether each of the other's faces has a cell where this one's has: their slots are then the same.
   bool has_same_cells(const LightMesh& other) const {
-    return elements_per_edge_ == other.elements_per_edge_ && grids_ == other.grids_ &&
-           clusters_ == other.clusters_;
+    return elements_per_edge_ == other.elements_per_edge_ && grids_ == other.grids_ && clusters_ == other.clusters_;
   }
   int slot_count() const { return first_cluster_slot() + clusters_.count(); }
   int elements_per_slot() const { return elements_per_edge_ * elements_per_edge_; }

@@ -30,6 +30,11 @@ class SobolSequence {
   std::array<std::uint32_t, 4> seeds_;  // by dimension
 };
 
+/// Coordinate in [0, 1) of point `index` of a one-dimensional sequence that is even over any aligned block of 2^k
+/// indices: van der Corput's, its order and digits scrambled after Owen by `seed`, so that sequences of two seeds can
+/// be used together [Burley 2020, section 4].
+double scrambled_coordinate(std::uint32_t index, std::uint32_t seed);
+
 /// The indices of a Sobol sequence below the least power of two that holds `count`, in an order in which each sixteen
 /// lie close together in the first two dimensions, whatever the seed: scrambling moves cells of the square as a whole.
 /// For rays traced in packets; leave out those from `count` on.

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from transom.commands.choices import checked_output
+from transom.commands.picture import GlazingOption
 from transom.errors import InputError
 
 FOLDER = Path("build") / "bench"
@@ -38,6 +39,7 @@ def bench(
     ] = None,
     rounds: Annotated[int, typer.Option(help="With --against: rounds, an odd number from 9.")] = ROUNDS,
     patches: Annotated[int, typer.Option(min=0, help="With --against: patches wanted; 0: the default.")] = 0,
+    glazing: GlazingOption = None,
     only: Annotated[
         list[str] | None, typer.Option(metavar="QUANTITY", help="With --against: time this alone; may be repeated.")
     ] = None,
@@ -73,30 +75,33 @@ def bench(
     if against is not None and speed_error:
         raise InputError("and --speed-error are two different questions", field="--against", remedy="Ask one at a time")
     if speed_error:
-        _speed_error(scene, output, view, condition, quick)
+        _speed_error(scene, output, view, condition, quick, glazing or [])
         return
     if against is not None:
+        if glazing:
+            remedy = "An earlier revision may know no products: put the glazing into a scene's folder"
+            raise InputError("is not possible with --against", field="--glazing", value=glazing, remedy=remedy)
         code = _against(scene, output, against, of, rounds, patches, only or [])
         if code:
             raise typer.Exit(code)
         return
     if of is not None:
         raise InputError("needs --against", field="--of", value=of, remedy="Name the revision to compare with")
-    _sizes(scene, output, budget, quick)
+    _sizes(scene, output, budget, quick, glazing or [])
 
 
-def _sizes(scene: str, output: Path | None, budget: float | None, quick: bool) -> None:
+def _sizes(scene: str, output: Path | None, budget: float | None, quick: bool, glazings: list[str]) -> None:
     from rich.console import Console
 
     from transom.bench import DEFAULT_BUDGET_S, QUICK_BUDGET_S, bench_lines, bench_points, bench_scene, write_bench
+    from transom.fenestration.reglazing import load_glazed
     from transom.progress import CaseProgress
-    from transom.scene import load_scene
 
-    loaded = load_scene(scene)
+    loaded = load_glazed(scene, glazings)
     path = _output(output, FOLDER / f"{loaded.name}.json")
     seconds = budget or (QUICK_BUDGET_S if quick else DEFAULT_BUDGET_S)
     with CaseProgress(len(bench_points(loaded, quick)), Console(stderr=True)) as bars:
-        measured = bench_scene(scene, bars, budget_s=seconds, quick=quick)
+        measured = bench_scene(scene, bars, budget_s=seconds, quick=quick, glazings=glazings)
     write_bench(path, measured)
     for line in bench_lines(measured):
         typer.echo(line)
@@ -121,7 +126,9 @@ def _growth(output: Path | None, quick: bool) -> None:
     typer.echo(f"{path} and {path.with_suffix('.svg')}")
 
 
-def _speed_error(scene: str, output: Path | None, view: str | None, condition: str | None, quick: bool) -> None:
+def _speed_error(
+    scene: str, output: Path | None, view: str | None, condition: str | None, quick: bool, glazings: list[str]
+) -> None:
     from rich.console import Console
 
     from transom.figures_speed import speed_error_figure
@@ -132,7 +139,7 @@ def _speed_error(scene: str, output: Path | None, view: str | None, condition: s
     path = _output(output, FOLDER / "speed_error.json")
     count = sum(entry.quick or not quick for entry in SETTINGS)
     with CaseProgress(count, Console(stderr=True)) as bars:
-        found = measure_speed_error(scene, bars, view=view, condition=condition, quick=quick)
+        found = measure_speed_error(scene, bars, view=view, condition=condition, quick=quick, glazings=glazings)
     write_speed_error(path, found)
     write_atomic(path.with_suffix(".svg"), speed_error_figure(found))
     for line in speed_error_lines(found):

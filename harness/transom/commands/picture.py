@@ -22,6 +22,15 @@ NoiseOption = Annotated[
     typer.Option(min=0.01, max=100.0, help="Mitsuba: mean relative standard error to reach [%]."),
 ]
 
+GlazingOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="OPENING=GLAZING",
+        help="Other glazing in an opening (may be repeated): none, clear:0.82, a product such as "
+        "'prismatic_panel(angle_low=30)' (transom list products), or a BSDF file.",
+    ),
+]
+
 DEFAULT_PICTURE_NOISE_PERCENT = 5.0
 
 
@@ -39,22 +48,24 @@ def render(
     ] = Method.gather,
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Pixels; the view's own size if omitted.")] = None,
     noise: NoiseOption = None,
+    glazing: GlazingOption = None,
 ) -> None:
     """Render a picture: radiance in cd/m² (.exr), or toned on the view's fixed scale (.png).
 
     \b
     Example:  transom render desk_office --time 2026-06-21T12:00 --sky clear --size 640x480 -o office.exr
+              transom render test_room --glazing south_upper=laser_cut_panel -o panel.png
     """
     from transom.bundle import make_case
     from transom.daylight.condition import resolve_condition
+    from transom.fenestration.reglazing import load_glazed
     from transom.images import write_picture
     from transom.progress import single_progress
     from transom.renderer import load_renderer
     from transom.run import Question, Target, render_case
-    from transom.scene import load_scene
 
     checked_output(output, (".exr", ".png"))
-    loaded = load_scene(scene)
+    loaded = load_glazed(scene, glazing or [])
     chosen = chosen_view(loaded, view, size)
     resolved = resolve_condition(chosen_condition(loaded, condition, time, sky), loaded.site)
     worker = load_renderer(renderer.value)

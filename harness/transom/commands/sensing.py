@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from transom.commands.choices import RendererName, checked_output, chosen_condition
-from transom.commands.picture import ConditionOption, NoiseOption, SceneArgument, SkyOption, TimeOption
+from transom.commands.picture import ConditionOption, GlazingOption, NoiseOption, SceneArgument, SkyOption, TimeOption
 from transom.errors import InputError
 
 
@@ -23,6 +23,7 @@ def sensors(
     sky: SkyOption = None,
     renderer: Annotated[RendererName, typer.Option(help="Who measures.")] = RendererName.engine,
     noise: NoiseOption = None,
+    glazing: GlazingOption = None,
 ) -> None:
     """Illuminance [lx] at points, with its standard error.
 
@@ -33,14 +34,14 @@ def sensors(
     """
     from transom.bundle import make_case
     from transom.daylight.condition import resolve_condition
+    from transom.fenestration.reglazing import load_glazed
     from transom.progress import single_progress
     from transom.renderer import load_renderer
     from transom.run import SENSOR_TARGET_PERCENT, Question, Target, render_case
-    from transom.scene import load_scene
     from transom.sensor_file import read_sensors, scene_sensors, write_sensors
 
     checked_output(output, (".csv",))
-    loaded = load_scene(scene)
+    loaded = load_glazed(scene, glazing or [])
     table = read_sensors(points) if points is not None else scene_sensors(loaded)
     if table is None:
         raise InputError("has no sensors", file=loaded.file, remedy="Give --points FILE.csv")

@@ -15,6 +15,10 @@ Vector = tuple[float, float, float]
 QUADRATURE_ORDER = 64  # In each of two altitude panels and in azimuth: CIE skies to better than 1e-8.
 
 
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(QUADRATURE_ORDER)
+"""Of Gauss-Legendre quadrature over -1..1; a plot of many hours would spend as long to find them as to relight."""
+
+
 class SkyPattern(Protocol):
     """A sky's relative luminance; its scale is arbitrary."""
 
@@ -60,8 +64,7 @@ def relative_horizontal_illuminance(pattern: SkyPattern, sun_altitude_rad: float
     The altitude range is split at the sun and azimuth counted from it, so that the cusp of the indicatrix falls on a
     corner of the panels, where the nodes crowd.
     """
-    node, weight = np.polynomial.legendre.leggauss(QUADRATURE_ORDER)
-    node, weight = (node + 1) / 2, weight / 2
+    node, weight = (NODES + 1) / 2, WEIGHTS / 2
     split = min(max(sun_altitude_rad, 0.0), math.pi / 2)
     altitude = np.concatenate([split * node, split + (math.pi / 2 - split) * node])
     altitude_weight = np.concatenate([split * weight, (math.pi / 2 - split) * weight])

@@ -9,10 +9,9 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from transom.errors import InputError
+from transom.errors import InputError, invalid_field
 from transom.products.section import Section
 from transom.products.shapes import SHAPES
-from transom.suite import invalid_field
 
 PRODUCT_ROOT = Path(__file__).resolve().parents[3] / "btdf_measurements"
 

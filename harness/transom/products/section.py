@@ -16,16 +16,17 @@ Float64 = NDArray[np.float64]
 Point = tuple[float, float]
 
 KINDS = {
-    "interface": _engine.LineKind.INTERFACE,
-    "gap": _engine.LineKind.GAP,
-    "mirror": _engine.LineKind.MIRROR,
-    "diffuse": _engine.LineKind.DIFFUSE,
+    "interface": _engine.SurfaceKind.INTERFACE,
+    "gap": _engine.SurfaceKind.GAP,
+    "mirror": _engine.SurfaceKind.MIRROR,
+    "diffuse": _engine.SurfaceKind.DIFFUSE,
 }
 
 
 @dataclass(frozen=True)
 class Line:
-    """From a to b as (y, z) [m]; the sides and numbers as in engine/include/transom/section.h."""
+    """From a to b as (y, z) [m]; sides, bow and numbers as in engine/include/transom/section.h and optical_surface.h.
+    left is the front of its surface."""
 
     a: Point
     b: Point
@@ -36,6 +37,22 @@ class Line:
     reflectance_right: float = 0.0
     transmittance: float = 0.0
     openness: float = 0.0
+    bow: float = 0.0
+
+    def points(self, count: int = 24) -> list[Point]:
+        """Points along it, for drawings and for tracers that know no arcs: its ends, and `count` more of an arc."""
+        if self.bow == 0:
+            return [self.a, self.b]
+        a, b = np.array(self.a), np.array(self.b)
+        chord = float(np.linalg.norm(b - a))
+        left = np.array([-(b - a)[1], (b - a)[0]]) / chord
+        half = 2 * np.arctan2(2 * self.bow, chord)  # of the angle that the arc turns through
+        radius = chord / (2 * np.sin(half))
+        turns = np.linspace(-half, half, count + 2)
+        middle = (a + b) / 2 - radius * np.cos(half) * left
+        along = (b - a) / chord
+        places = middle + radius * (np.outer(np.sin(turns), along) + np.outer(np.cos(turns), left))
+        return [self.a, *((float(y), float(z)) for y, z in places[1:-1]), self.b]
 
 
 @dataclass(frozen=True)
@@ -61,6 +78,17 @@ class Traced:
 
 
 @dataclass(frozen=True)
+class Sweep:
+    """Light of N incident directions. incidence (M,): of each exit, the row of its incident direction.
+    transmittance, reflectance: (N,), direct-hemispherical."""
+
+    transmitted: Exits
+    incidence: NDArray[np.int64]
+    transmittance: Float64
+    reflectance: Float64
+
+
+@dataclass(frozen=True)
 class Section:
     """One period of a product. media: (index of refraction, absorption [1/m]), the first is air."""
 
@@ -72,7 +100,7 @@ class Section:
     @property
     def depth(self) -> tuple[float, float]:
         """Least and greatest z of its lines [m]."""
-        z = [point[1] for line in self.lines for point in (line.a, line.b)]
+        z = [point[1] for line in self.lines for point in line.points()]
         return min(z), max(z)
 
     @cached_property
@@ -83,18 +111,16 @@ class Section:
         for index, absorption in self.media:
             core.add_medium(index, absorption)
         for line in self.lines:
-            for a, b in _within_period(line.a, line.b, self.period_m):
-                core.add_line(
-                    a,
-                    b,
-                    KINDS[line.kind],
-                    line.left,
-                    line.right,
-                    line.reflectance,
-                    line.reflectance_right,
-                    line.transmittance,
-                    line.openness,
-                )
+            surface = _engine.Surface(
+                KINDS[line.kind],
+                line.left,
+                line.right,
+                line.reflectance,
+                line.reflectance_right,
+                line.transmittance,
+                line.openness,
+            )
+            core.add_line(line.a, line.b, line.bow, surface)
         core.validate()
         return core
 
@@ -104,26 +130,14 @@ class Section:
         sent, back, absorbed, unfinished = _engine.trace_section(self._core, (x, y, z), rays, seed)
         return Traced(Exits(sent[:, :3], sent[:, 3]), Exits(back[:, :3], back[:, 3]), absorbed, unfinished)
 
+    def sweep(self, directions: Float64, rays: int = 16, seed: int = 1) -> Sweep:
+        """Sends light along each of `directions` (N, 3) through the product: many directions, few rays each."""
+        exits, incidence, sent, back = _engine.trace_section_sweep(
+            self._core, np.ascontiguousarray(directions, np.float64), rays, seed
+        )
+        return Sweep(Exits(exits[:, :3], exits[:, 3]), incidence.astype(np.int64), sent, back)
+
 
 def polyline(points: Sequence[Point], **side: object) -> list[Line]:
     """Lines through points, all with the same sides."""
     return [Line(a, b, **side) for a, b in itertools.pairwise(points)]  # type: ignore[arg-type]
-
-
-def _within_period(a: Point, b: Point, period: float) -> list[tuple[Point, Point]]:
-    """A line cut at the borders of the period and moved into it."""
-    (y0, z0), (y1, z1) = a, b
-    low, high = min(y0, y1), max(y0, y1)
-    cuts = [0.0, 1.0]
-    if high > low:
-        borders = np.arange(np.floor(low / period), np.ceil(high / period) + 1) * period
-        cuts += [float((border - y0) / (y1 - y0)) for border in borders]
-    cuts = sorted({round(cut, 15) for cut in cuts if 0 <= cut <= 1})
-    pieces: list[tuple[Point, Point]] = []
-    for t0, t1 in itertools.pairwise(cuts):
-        shift = np.floor((y0 + 0.5 * (t0 + t1) * (y1 - y0)) / period) * period
-        start = (min(max(y0 + t0 * (y1 - y0) - shift, 0.0), period), z0 + t0 * (z1 - z0))
-        end = (min(max(y0 + t1 * (y1 - y0) - shift, 0.0), period), z0 + t1 * (z1 - z0))
-        if start != end:
-            pieces.append((start, end))
-    return pieces

@@ -7,22 +7,14 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-
-import numpy as np
 
 from transom.products.section import Line, Point, Section, polyline
 
 AIR = (1.0, 0.0)
 SHEET_M = 1e-6
 """Distance between the two sides of a sheet whose sides differ, and from cuts to the faces that they nearly reach."""
-
-OFFSET = 0.37
-"""Of a period: where a section begins, so that no line lies on the border of the period."""
-
-ARC_LINES = 24
-"""Straight lines that stand for an arc."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +55,7 @@ def prismatic(
         Line((0.0, 0.0), (pitch, 0.0), left=1, right=0),
         *(line for line in polyline(profile, left=0, right=1) if line.a != line.b),
     ]
-    section = Section(pitch, (AIR, (index, absorption)), tuple(_moved(lines, pitch)))
+    section = Section(pitch, (AIR, (index, absorption)), tuple(lines))
     return _turned(section) if prisms_outdoors else section
 
 
@@ -82,7 +74,7 @@ def laser_cut_panel(
             Line((0.0, 0.0), (0.0, depth), left=0, right=1),
             Line((wide, 0.0), (wide, depth), left=1, right=0),
         ]
-    return Section(spacing, (AIR, (index, absorption)), tuple(_moved(lines, spacing)))
+    return Section(spacing, (AIR, (index, absorption)), tuple(lines))
 
 
 def slat_blind(
@@ -101,19 +93,13 @@ def slat_blind(
     _require(spacing > 0 and width > 0, "spacing and width must be > 0")
     for mirror, diffuse in ((mirror_top, diffuse_top), (mirror_bottom, diffuse_bottom)):
         _require(mirror == 0 or diffuse == 0, "a side is a mirror or diffuse, not both")
-    along = np.linspace(-0.5, 0.5, 2 if sagitta == 0 else ARC_LINES + 1)
+    _require(0 <= sagitta < width / 2, "sagitta is within 0..width / 2")
     t = math.radians(tilt)
-    points: list[Point] = []
-    for u in along:
-        bow = 4 * sagitta * (0.25 - u * u)
-        points.append(
-            (width * u * math.sin(t) + bow * math.cos(t), width * (u + 0.5) * math.cos(t) - bow * math.sin(t))
-        )
-    # a -> b runs into the room: its left is below (-y), its right above.
-    lowered = [(y - SHEET_M, z) for y, z in points]
+    outer, inner = (-0.5 * width * math.sin(t), 0.0), (0.5 * width * math.sin(t), width * math.cos(t))
+    # outer -> inner runs into the room: its left is below (-y), its right above.
     lines = [
-        *polyline(points, **_side("right", mirror_top, diffuse_top, openness)),
-        *polyline(lowered, **_side("left", mirror_bottom, diffuse_bottom, openness)),
+        _line(outer, inner, bow=-sagitta, **_side("right", mirror_top, diffuse_top)),
+        _line(_below(outer), _below(inner), bow=-sagitta, **_side("left", mirror_bottom, diffuse_bottom)),
     ]
     if openness > 0:
         # Holes go through both sheets at once: one sheet carries them, and what the two sides reflect.
@@ -121,14 +107,18 @@ def slat_blind(
             (mirror_top == 0) == (mirror_bottom == 0), "a perforated slat has two diffuse sides or two mirrored sides"
         )
         kind = "mirror" if mirror_top or mirror_bottom else "diffuse"
-        lines = polyline(
-            points,
-            kind=kind,
-            reflectance=mirror_bottom or diffuse_bottom,
-            reflectance_right=mirror_top or diffuse_top,
-            openness=openness,
-        )
-    return Section(spacing, (AIR,), tuple(_moved(lines, spacing)))
+        lines = [
+            Line(
+                outer,
+                inner,
+                kind,
+                reflectance=mirror_bottom or diffuse_bottom,
+                reflectance_right=mirror_top or diffuse_top,
+                openness=openness,
+                bow=-sagitta,
+            )
+        ]
+    return Section(spacing, (AIR,), tuple(lines))
 
 
 def curved_lamellae(
@@ -145,21 +135,20 @@ def curved_lamellae(
     """Curved bars stacked between two panes of glass, which guide light by total reflection. slope_out, slope_in: of
     the bars at the outdoor and the room end, degrees from horizontal, positive rising into the room."""
     _require(spacing > thickness > 0 and depth > 0, "0 < thickness < spacing and depth > 0")
-    z = np.linspace(0.0, depth, ARC_LINES + 1)
-    a, b = math.tan(math.radians(slope_out)), math.tan(math.radians(slope_in))
-    middle = a * z + (b - a) * z * z / (2 * depth)
-    start = pane + gap
-    low = [(float(y), float(start + w)) for y, w in zip(middle, z, strict=True)]
-    high = [(y + thickness, w) for y, w in low]
+    start, end = pane + gap, pane + gap + depth
+    middle, turn = math.radians(slope_out + slope_in) / 2, math.radians(slope_in - slope_out)
+    low = (0.0, start), (depth * math.tan(middle), end)
+    high = (thickness, start), (depth * math.tan(middle) + thickness, end)
+    bow = 0.5 * depth / math.cos(middle) * math.tan(turn / 4)
     lines = [
-        *polyline(low, left=0, right=1),
-        *polyline(high, left=1, right=0),
+        Line(*low, left=0, right=1, bow=bow),
+        Line(*high, left=1, right=0, bow=bow),
         Line(low[0], high[0], left=1, right=0),
-        Line(low[-1], high[-1], left=0, right=1),
+        Line(low[1], high[1], left=0, right=1),
         *_pane(0.0, pane, spacing, 2),
-        *_pane(start + depth + gap, start + depth + gap + pane, spacing, 2),
+        *_pane(end + gap, end + gap + pane, spacing, 2),
     ]
-    return Section(spacing, (AIR, (index, absorption), (1.52, 0.0)), tuple(_moved(lines, spacing)))
+    return Section(spacing, (AIR, (index, absorption), (1.52, 0.0)), tuple(lines))
 
 
 def voids(
@@ -178,7 +167,7 @@ def voids(
         Line(tip, bottom, left=1, right=0),
         Line(bottom, top, left=1, right=0),
     ]
-    return Section(spacing, (AIR, (index, absorption)), tuple(_moved(lines, spacing)))
+    return Section(spacing, (AIR, (index, absorption)), tuple(lines))
 
 
 def reflective_louvre(
@@ -189,14 +178,12 @@ def reflective_louvre(
     rise: of the room edge over the outer edge. bow: how far the middle hangs below the line between the edges.
     """
     _require(spacing > 0 and width > 0 and bow >= 0, "spacing and width must be > 0, bow not negative")
-    u = np.linspace(0.0, 1.0, ARC_LINES + 1)
-    points = [(float(rise * t - 4 * bow * t * (1 - t)), float(width * t)) for t in u]
-    below = [(y - SHEET_M, z) for y, z in points]
+    outer, inner = (0.0, 0.0), (rise, width)
     lines = [
-        *polyline(points, **_side("right", reflectance, 0.0, 0.0)),
-        *polyline(below, **_side("left", reflectance_below, 0.0, 0.0)),
+        _line(outer, inner, bow=bow, **_side("right", reflectance, 0.0)),
+        _line(_below(outer), _below(inner), bow=bow, **_side("left", reflectance_below, 0.0)),
     ]
-    return Section(spacing, (AIR,), tuple(_moved(lines, spacing)))
+    return Section(spacing, (AIR,), tuple(lines))
 
 
 SHAPES: dict[str, Shape] = {
@@ -222,29 +209,19 @@ def _pane(low: float, high: float, period: float, medium: int) -> list[Line]:
     ]
 
 
-def _side(side: str, mirror: float, diffuse: float, openness: float) -> dict[str, object]:
-    """Arguments of the lines of one side of a sheet; the other side, which nothing meets, is black."""
+def _below(place: Point) -> Point:
+    """Where the lower side of a sheet is."""
+    return place[0] - SHEET_M, place[1]
+
+
+def _side(side: str, mirror: float, diffuse: float) -> dict[str, object]:
+    """Arguments of the line of one side of a sheet; the other side, which nothing meets, is black."""
     name = "reflectance" if side == "left" else "reflectance_right"
-    return {"kind": "mirror" if mirror else "diffuse", name: mirror or diffuse, "openness": openness}
+    return {"kind": "mirror" if mirror else "diffuse", name: mirror or diffuse}
 
 
-def _moved(lines: Sequence[Line], period: float) -> list[Line]:
-    """Lines moved along y, so that none lies on the border of the period."""
-    shift = OFFSET * period
-    return [
-        Line(
-            (line.a[0] + shift, line.a[1]),
-            (line.b[0] + shift, line.b[1]),
-            line.kind,
-            line.left,
-            line.right,
-            line.reflectance,
-            line.reflectance_right,
-            line.transmittance,
-            line.openness,
-        )
-        for line in lines
-    ]
+def _line(a: Point, b: Point, bow: float, **side: object) -> Line:
+    return Line(a, b, bow=bow, **side)  # type: ignore[arg-type]
 
 
 def _turned(section: Section) -> Section:
@@ -261,6 +238,7 @@ def _turned(section: Section) -> Section:
             line.reflectance,
             line.transmittance,
             line.openness,
+            -line.bow,
         )
         for line in section.lines
     )

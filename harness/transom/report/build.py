@@ -105,8 +105,9 @@ def _timings(suites: Sequence[Suite], build: Path, note: Callable[[str], None]) 
 
 
 def _judged_scenes(suites: Sequence[Suite]) -> list[str]:
-    """Scenes that are judged against Mitsuba, by name."""
-    names = {case.scene.name: None for suite in suites if suite.reference == "mitsuba" for case in suite.cases}
+    """Scenes that are judged against Mitsuba, by name; variants are timed in the chapter on fenestration."""
+    cases = [case for suite in suites if suite.reference == "mitsuba" for case in suite.cases]
+    names = {case.scene.name: None for case in cases if not case.scene.variant_of}
     return list(names)
 
 

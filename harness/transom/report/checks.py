@@ -7,7 +7,7 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from transom.check import Checked
-from transom.suite import invalid_field
+from transom.errors import invalid_field
 
 
 def read_check(path: Path) -> list[Checked]:

@@ -38,7 +38,9 @@ def content_key(scene: Scene) -> str:
         digest.update(plain.tobytes())
     lights = {
         "materials": [(m.reflectance, m.luminance, m.smooth, m.opening) for m in scene.materials],
-        "openings": [(o.glazing, o.visible_transmittance) for o in scene.openings],
+        "openings": [
+            (o.glazing, o.visible_transmittance, *([o.product.digest] if o.product else [])) for o in scene.openings
+        ],
         "point_sources": [(p.position, p.intensity) for p in scene.point_sources],
     }
     digest.update(json.dumps(lights, sort_keys=True).encode())

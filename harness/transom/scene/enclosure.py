@@ -91,7 +91,8 @@ class TriangleRays:
         enters = np.fmax.reduce(np.fmin(to_low, to_high), axis=1)
         leaves = np.fmin.reduce(np.fmax(to_low, to_high), axis=1)
         chosen = self.blocks[(leaves >= 0) & (enters <= leaves)].ravel()
-        return chosen[chosen >= 0]
+        near: TriangleIndex = chosen[chosen >= 0]
+        return near
 
     def nearest(
         self, origins: Float64, directions: Float64, ignored: NDArray[np.bool_] | None = None

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from transom.errors import InputError
+from transom.fenestration import choice as product_choice
 from transom.scene import checks
 from transom.scene.geometry import build_mesh
 from transom.scene.mesh import read_mesh
@@ -26,7 +27,7 @@ from transom.scene.model import (
     Site,
     View,
 )
-from transom.scene.schema import SceneTable, SensorTable, SiteTable
+from transom.scene.schema import OpeningTable, SceneTable, SensorTable, SiteTable
 from transom.scene.wording import input_error, near, shown_path
 
 FILE_NAME = "scene.toml"
@@ -91,9 +92,7 @@ def load_scene(name_or_path: str | Path) -> Scene:
         description=table.description,
         mesh=mesh,
         materials=materials,
-        openings=tuple(
-            Opening(entry.name, entry.material, entry.glazing, entry.transmittance) for entry in table.openings
-        ),
+        openings=tuple(_opening(entry, index, file.parent, shown) for index, entry in enumerate(table.openings)),
         point_sources=tuple(PointSource(p.name, p.position_m, p.intensity_cd) for p in table.point_sources),
         site=_site(table.site, table, shown),
         views=_views(table),
@@ -159,6 +158,18 @@ def _materials(table: SceneTable) -> tuple[Material, ...]:
         for name, entry in table.materials.items()
     ]
     return (*opaque, *(Material(entry.material, opening=index) for index, entry in enumerate(table.openings)))
+
+
+def _opening(entry: OpeningTable, index: int, folder: Path, shown: str) -> Opening:
+    product = None
+    if entry.glazing == "product":
+        try:
+            product = product_choice.choose_product(entry.product, entry.parameters, folder)
+        except InputError as error:
+            raise InputError(
+                f"cannot be used: {error}", file=shown, field=f"openings[{index}].product", value=entry.product
+            ) from None
+    return Opening(entry.name, entry.material, entry.glazing, entry.transmittance, product)
 
 
 def _site(site: SiteTable | None, table: SceneTable, shown: str) -> Site:

@@ -60,17 +60,32 @@ class Material:
 
 
 @dataclass(frozen=True)
+class ProductChoice:
+    """A glazing product in an opening (transom.fenestration).
+
+    name: a product's, or the path of a BSDF file. parameters: numbers that differ from the product's own.
+    digest: SHA-256 (hex) of all that its light depends on.
+    """
+
+    name: str
+    parameters: tuple[tuple[str, float], ...]
+    digest: str
+
+
+@dataclass(frozen=True)
 class Opening:
     """An opening group: all faces of one mesh material that daylight passes. Its faces' fronts look outdoors.
 
-    glazing: "clear" (one pane, angular transmittance by transom.glass) or "none" (an unglazed hole).
-    visible_transmittance: normal-hemispherical transmittance at normal incidence, 0..1.
+    glazing: "clear" (one pane, angular transmittance by transom.glass), "none" (an unglazed hole), or "product" (a
+    complex fenestration system). visible_transmittance: normal-hemispherical transmittance at normal incidence, 0..1;
+    0 for a product, which passes no light straight but by its own BTDF. product: what is in it, for "product" alone.
     """
 
     name: str
     material: str
-    glazing: Literal["clear", "none"]
+    glazing: Literal["clear", "none", "product"]
     visible_transmittance: float
+    product: ProductChoice | None = None
 
 
 @dataclass(frozen=True)
@@ -150,7 +165,11 @@ class ConditionSpec:
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything that a scene folder says. The first view and the first condition are the defaults."""
+    """Everything that a scene folder says. The first view and the first condition are the defaults.
+
+    A variant (transom.fenestration.reglazing) has other glazing than its folder says: variant_of is then the folder's
+    name, and glazings say what was replaced, as on the command line.
+    """
 
     name: str
     file: Path
@@ -166,3 +185,5 @@ class Scene:
     regions: tuple[Region, ...]
     sensors: tuple[SensorSet, ...]
     tags: tuple[str, ...] = field(default=())
+    variant_of: str = ""
+    glazings: tuple[str, ...] = ()

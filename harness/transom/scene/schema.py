@@ -83,12 +83,36 @@ class OpeningTable(Table):
 
     name: Name
     material: Text
-    glazing: Annotated[Literal["clear", "none"], one_of("clear", "none", meaning="a kind of glazing")] = "clear"
+    glazing: Annotated[
+        Literal["clear", "none", "product"], one_of("clear", "none", "product", meaning="a kind of glazing")
+    ] = "clear"
     visible_transmittance: Annotated[float | None, PlainValidator(_check_transmittance)] = None
+    product: Annotated[str, PlainValidator(check_text)] = ""
+    parameters: dict[str, Annotated[float, number(-INFINITY, INFINITY, "parameter of a product")]] = Field(
+        default_factory=dict
+    )
+
+    @model_validator(mode="after")
+    def _product_is_said_where_it_belongs(self) -> OpeningTable:
+        if self.glazing == "product":
+            if not self.product:
+                remedy = 'Add for example product = "prismatic_panel" (transom list products), or a BSDF file'
+                raise fail("is missing", remedy, "product")
+            if self.visible_transmittance is not None:
+                remedy = "Remove it: a product's transmission is its own"
+                raise fail(
+                    "has no meaning beside a product", remedy, "visible_transmittance", self.visible_transmittance
+                )
+        elif self.product or self.parameters:
+            field, value = ("product", self.product) if self.product else ("parameters", self.parameters)
+            raise fail('has no meaning without glazing = "product"', 'Write glazing = "product"', field, value)
+        return self
 
     @model_validator(mode="after")
     def _glass_is_possible(self) -> OpeningTable:
         found = self.visible_transmittance
+        if self.glazing == "product":
+            return self
         if self.glazing == "none":
             if found is not None and found != 1.0:
                 raise fail(
@@ -111,8 +135,10 @@ class OpeningTable(Table):
 
     @property
     def transmittance(self) -> float:
-        """visible_transmittance, which is 1 for an unglazed hole."""
-        return 1.0 if self.visible_transmittance is None else self.visible_transmittance
+        """visible_transmittance, which is 1 for an unglazed hole, and 0 for a product: nothing passes straight."""
+        if self.visible_transmittance is not None:
+            return self.visible_transmittance
+        return 1.0 if self.glazing == "none" else 0.0
 
 
 class PointSourceTable(Table):
