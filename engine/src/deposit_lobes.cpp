@@ -73,7 +73,7 @@ void DirectLight::shaft_transmission(const Beam& lobe, std::span<const glm::vec3
 std::vector<std::size_t> DirectLight::reached_by_lobe(const Beam& lobe, const Receivers& receivers) const {
   std::vector<std::size_t> found;
   for (std::size_t i = 0; i < receivers.slots.size() && !lobe.shafts->empty(); ++i) {
-    if (glm::dot(lobe.direction_to_source, receivers.normals[i]) <= 0) continue;
+    if (mesh_.is_cluster(receivers.slots[i]) || glm::dot(lobe.direction_to_source, receivers.normals[i]) <= 0) continue;
     const Corners& corner = receivers.corners[i];
     const glm::vec3 low = glm::min(glm::min(corner[0], corner[1]), glm::min(corner[2], corner[3]));
     const glm::vec3 high = glm::max(glm::max(corner[0], corner[1]), glm::max(corner[2], corner[3]));

@@ -77,6 +77,8 @@ class DirectLight {
   void shaft_transmission(const Beam& lobe, std::span<const glm::vec3> points, std::span<float> share) const;
   void sources_on_slot(int slot, const Corners& corners, glm::vec3 normal, const Patterns& patterns,
                        std::vector<glm::vec3>& sum) const;
+  void sources_and_beams_on_cluster(const std::vector<Beam>& beams, int slot, std::uint32_t seed,
+                                    std::vector<glm::vec3>& sum) const;
 
   void ignore_small_openings(glm::vec3 direction, std::span<const glm::vec3> points, std::span<float> share) const;
   std::map<int, glm::vec3> send_through_small_openings(const std::vector<Beam>& beams, std::uint32_t seed) const;

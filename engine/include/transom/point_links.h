@@ -65,11 +65,11 @@ class PointLinks {
     glm::vec3 flux;              // reflected [lm], over pi
   };
   std::size_t bytes_of(const Link& link) const;
-  glm::vec3 exposed_middle(int slot, glm::vec3 normal) const;
+  glm::vec3 exposed_middle(int slot) const;
   std::vector<std::shared_ptr<const Link>> links_of(const std::vector<int>& slots, const Known& known) const;
   std::shared_ptr<const Link> link(int slot, const Known& known) const;
   void link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points, const KnownPoints& known) const;
-  void link_near(Link& link, int slot, glm::vec3 normal, const KnownPoints& known) const;
+  void link_near(Link& link, int slot, const KnownPoints& known) const;
   LitPatch lit_patch(std::span<const BrightElement> bright, std::size_t first, std::size_t last) const;
 
   const LightMesh& mesh_;
