@@ -10,7 +10,19 @@ from collections.abc import Callable
 
 import typer
 
-from transom.commands import benching, checking, judging, listing, picture, products, running, sensing, status, tracing
+from transom.commands import (
+    benching,
+    checking,
+    judging,
+    listing,
+    lobes,
+    picture,
+    products,
+    running,
+    sensing,
+    status,
+    tracing,
+)
 from transom.errors import InputError
 
 WRONG_USE = 2
@@ -41,6 +53,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
     "bench": (benching.bench, "Time a scene; or two builds against each other."),
     "trace": (tracing.trace, "Where the time goes, for Perfetto."),
     "measure": (products.measure, "Trace light through a product; its tables as Klems XML."),
+    "lobes": (lobes.lobes, "Beams of the sun behind a product; how good they are."),
     "bsdf": (products.bsdf, "Check a product's BSDF file; export it as Klems XML."),
     "check": (checking.check, "Has accuracy changed? References, and our own baseline."),
     "bless": (checking.bless, "Accept the present answers as a suite's baseline."),

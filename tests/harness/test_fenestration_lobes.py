@@ -168,7 +168,7 @@ def test_a_lobe_that_is_absent_at_a_corner_fades_towards_it() -> None:
     for share in (1.0, 0.6, 0.2):
         incident = share * grid[0] + (1 - share) * grid[1]
         found = table.at(incident / np.linalg.norm(incident))
-        fading = [lobe for lobe in found.lobes if angle_deg(lobe.direction, other) < 1]
+        fading = [lobe for lobe in found.lobes if angle_deg(lobe.direction, other) < 6.1]
         assert sum(lobe.share for lobe in fading) == pytest.approx(0.3 * share, abs=1e-9)
         assert found.total == pytest.approx(0.5 + 0.3 * share, abs=1e-9)
 
