@@ -14,7 +14,7 @@ from transom.errors import InputError
 if TYPE_CHECKING:
     from transom.fenestration.evaluation import ProductEvaluation
 
-FIGURES = "represented.png", "moved.png", "room.png"
+FIGURES = "represented", "moved", "room"
 
 
 def lobes(
@@ -28,7 +28,7 @@ def lobes(
     evaluate: Annotated[bool, typer.Option("--evaluate", help="Measure fractions and errors; all products.")] = False,
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="OUT.json", help="Of --evaluate: figures go beside it.")
-    ] = Path("build/lobes/evaluation.json"),
+    ] = Path("build/lobes.json"),
     rays: Annotated[int, typer.Option(help="Of the second tracer, for each sun.", min=64, max=65536)] = 1024,
     every: Annotated[int, typer.Option(help="Leave out each such incident direction in turn.", min=1)] = 3,
 ) -> None:
@@ -40,7 +40,7 @@ def lobes(
 
     \b
     Example:  transom lobes "prismatic_panel(angle_low=30)" --sun 45,20
-              transom lobes --evaluate -o build/lobes/evaluation.json
+              transom lobes --evaluate -o build/lobes.json
     """
     if evaluate:
         _evaluate(products or [], output, rays, every)
@@ -100,8 +100,8 @@ def _evaluate(products: list[str], output: Path, rays: int, every: int) -> None:
     for result in results:
         typer.echo(_summary(result))
     for name, draw in zip(FIGURES, (represented_figure, moved_figure, room_figure), strict=True):
-        write_atomic(output.with_name(name), draw(results))
-    typer.echo(f"{output}: {len(results)} products; beside it {', '.join(FIGURES)}")
+        write_atomic(output.with_name(f"{output.stem}_{name}.png"), draw(results))
+    typer.echo(f"{output}: {len(results)} products; figures {', '.join(FIGURES)} beside it")
 
 
 def _kept(output: Path) -> list[dict[str, object]]:

@@ -74,7 +74,7 @@ def followed(
         moved[:, 2] = np.maximum(moved[:, 2], GRAZING)
         moved /= np.linalg.norm(moved, axis=1, keepdims=True)
         for lobe, vector in zip(lobes, moved, strict=True):
-            found.append(Lobe(vector, lobe.share * float(weights[here]), lobe.width_rad))
+            found.append(Lobe(vector, lobe.share * float(weights[here]), lobe.width_rad, lobe.along))
     return merged(found)
 
 
@@ -89,7 +89,7 @@ def merged(lobes: Sequence[Lobe]) -> list[Lobe]:
         shares = np.array([lobe.share for lobe in group])
         vector = shares @ np.array([lobe.direction for lobe in group])
         width = float(shares @ [lobe.width_rad for lobe in group] / shares.sum())
-        found.append(Lobe(vector / np.linalg.norm(vector), float(shares.sum()), width))
+        found.append(Lobe(vector / np.linalg.norm(vector), float(shares.sum()), width, group[0].along))
     return sorted(found, key=lambda lobe: -lobe.share)
 
 

@@ -160,6 +160,7 @@ def _room_errors(fenestration: TracedFenestration, rays: int) -> tuple[Float64, 
     differences of transmittance (suns,), the second tracer's standard error of their mean, and the largest difference
     between lobes + residual and the rays that were split."""
     bins = bin_landing(PANEL_BINS)
+    dark = DARK * float(illuminance(np.zeros(len(TARGETS)), 1.0)[0])
     incident, exits = _exits(fenestration, FINE_STEP_DEG)
     table = LobeTable(incident, [split(light.directions, light.flux, PANEL_BINS) for light in exits], PANEL_BINS)
     suns = sun_directions()
@@ -179,8 +180,7 @@ def _room_errors(fenestration: TracedFenestration, rays: int) -> tuple[Float64, 
                 (landed(own.directions, own.flux), own.total),
             )
         ):
-            found = illuminance(direct, total)
-            errors[which, row] = np.where(truth > 0, found / np.where(truth > 0, truth, 1) - 1, np.sign(found))
+            errors[which, row] = (illuminance(direct, total) - truth) / np.maximum(truth, dark)
         differences[row] = through.total - float(flux.sum())
         spread[row] = (halves[0].total - halves[1].total) / 2
         split_difference = max(split_difference, abs(through.total - own.total))
@@ -199,6 +199,10 @@ def _independent(fenestration: TracedFenestration, sun: Float64, rays: int, seed
         return trace_paths(fenestration.geometry, sun, rays, seed).transmitted
     return fenestration.geometry.trace(sun, 16 * rays, seed).transmitted
 
+
+DARK = 0.01
+"""Errors are relative to at least so much of the interreflected light behind a panel that transmits everything: where
+next to nothing is transmitted, a ratio says nothing."""
 
 SKY_SUN = 10
 """Of the suns, the one under which the clear sky stands: an equinox morning."""
