@@ -1,6 +1,7 @@
 // Python's view of the engine: arrays in, arrays out, nothing computed here.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -15,6 +16,7 @@
 #include "transom/error.h"
 #include "transom/frame.h"
 #include "transom/gl_context.h"
+#include "transom/relight_worker.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -43,14 +45,21 @@ nb::ndarray<nb::numpy, float> picture(std::vector<glm::vec3>&& pixels, int width
   return to_array<float>(std::move(pixels), {static_cast<std::size_t>(height), static_cast<std::size_t>(width), 3});
 }
 
+glm::vec3 vector_of(std::tuple<float, float, float> v) {
+  return {std::get<0>(v), std::get<1>(v), std::get<2>(v)};
+}
+
 // The engine with its present light, the renderer that looks at it, and the sensors that were asked last.
 struct Session {
   Engine engine;
   FrameRenderer renderer;
   std::shared_ptr<const Lighting> present = std::make_shared<const Lighting>();
-  std::shared_ptr<Lighting> in_steps;
   Sensors sensors;
-  const Lighting* previous() const { return present->shooting.unshot.empty() ? nullptr : present.get(); }
+  std::unique_ptr<RelightWorker> worker;  // while light is found beside other work; after the engine that it uses
+  std::pair<std::uint64_t, bool> take(RelightWorker::State state) {
+    if (state.number > 0) present = std::move(state.lighting);
+    return {state.number, state.number > 0 && present->is_final};
+  }
   Session(SceneGeometry scene, const SkyBins& bins, SolveOptions options)
       : engine(std::move(scene), bins, options), renderer(engine) {}
   Session(const Session& solved, SceneGeometry scene) : engine(solved.engine, std::move(scene)), renderer(engine) {}
@@ -123,6 +132,17 @@ NB_MODULE(_engine, m) {
           },
           "transmittance"_a, "diffuse_reflectance"_a)
       .def(
+          "add_panels",
+          [](SceneGeometry& s, In<float, nb::shape<3, 3>> axes, In<float, nb::ndim<1>> polar_edges,
+             In<int, nb::ndim<1>> counts) {
+            const std::vector<glm::vec3> rows = to_vector<glm::vec3>(axes);
+            s.openings.push_back({std::vector<float>(2, 0.f), 0.f,
+                                  PanelFrame{rows[0], rows[1], rows[2],
+                                             AngleBins(to_vector<float>(polar_edges), to_vector<int>(counts))}});
+          },
+          "axes"_a, "polar_edges"_a, "counts"_a,
+          "An opening group that holds a product; rows x, y, z of its frame in the world, bins of its directions.")
+      .def(
           "add_point_source",
           [](SceneGeometry& s, std::tuple<double, double, double> position, std::tuple<float, float, float> intensity) {
             const auto [x, y, z] = position;
@@ -154,6 +174,7 @@ NB_MODULE(_engine, m) {
       .def_rw("elements_per_edge", &SolveOptions::elements_per_edge)
       .def_rw("patch_samples", &SolveOptions::patch_samples)
       .def_rw("node_samples", &SolveOptions::node_samples)
+      .def_rw("panel_rays", &SolveOptions::panel_rays)
       .def_rw("node_spacing", &SolveOptions::node_spacing)
       .def_rw("tolerance", &SolveOptions::tolerance)
       .def_rw("seed", &SolveOptions::seed)
@@ -177,7 +198,9 @@ NB_MODULE(_engine, m) {
       .def_ro("cluster_count", &SolveFacts::cluster_count)
       .def_ro("link_bytes", &SolveFacts::link_bytes)
       .def_ro("kept_patch_rows", &SolveFacts::kept_patch_rows)
-      .def_ro("kept_node_rows", &SolveFacts::kept_node_rows);
+      .def_ro("kept_node_rows", &SolveFacts::kept_node_rows)
+      .def_ro("panel_count", &SolveFacts::panel_count)
+      .def_ro("panel_bin_count", &SolveFacts::panel_bin_count);
 
   nb::class_<Condition>(m, "Condition")
       .def(
@@ -202,7 +225,22 @@ NB_MODULE(_engine, m) {
             const auto [r, g, b] = illuminance;
             c.beams.push_back({{x, y, z}, {r, g, b}});
           },
-          "direction_to_source"_a, "normal_illuminance"_a);
+          "direction_to_source"_a, "normal_illuminance"_a)
+      .def(
+          "add_lobe",
+          [](Condition& c, int opening, std::tuple<float, float, float> direction,
+             std::tuple<float, float, float> illuminance, std::tuple<float, float, float> sun) {
+            c.beams.push_back({vector_of(direction), vector_of(illuminance), opening, vector_of(sun)});
+          },
+          "opening"_a, "direction_to_source"_a, "normal_illuminance"_a, "direction_to_sun"_a,
+          "Parallel light behind the panels of an opening group that the sun reaches.")
+      .def(
+          "add_residual",
+          [](Condition& c, int opening, In<float, nb::shape<-1, 3>> radiance, std::tuple<float, float, float> sun) {
+            c.residuals.push_back({opening, vector_of(sun), to_vector<glm::vec3>(radiance)});
+          },
+          "opening"_a, "radiance"_a, "direction_to_sun"_a,
+          "Radiance of panels in full sun by exit bin [cd/m²]: the sun's light that lobes leave.");
 
   nb::class_<View>(m, "View").def(
       "__init__",
@@ -235,19 +273,30 @@ NB_MODULE(_engine, m) {
            "Solves an edited scene, and takes over what is still valid: equal to solving it afresh.")
       .def_prop_ro("facts", [](const Session& s) { return s.engine.facts(); })
       .def(
-          "relight", [](Session& s, const Condition& c) { s.present = s.engine.relight(c, s.previous()); },
+          "set_product",
+          [](Session& s, int opening, In<float, nb::shape<-1, -1>> transmission, float room_reflectance) {
+            s.engine.set_product(opening, {to_vector<float>(transmission), room_reflectance});
+          },
+          "opening"_a, "transmission"_a, "room_reflectance"_a,
+          "BTDF by bins [1/sr], row = exit bin, and room reflectance of an opening group's panels.")
+      .def(
+          "relight", [](Session& s, const Condition& c) { s.present = s.engine.relight(c, s.present.get()); },
           "condition"_a, nb::call_guard<nb::gil_scoped_release>())
       .def(
-          "begin_relight",
-          [](Session& s, const Condition& c) {
-            s.in_steps = std::make_shared<Lighting>(s.engine.begin_relight(c, s.previous()));
-            s.present = s.in_steps;
-          },
-          "condition"_a, nb::call_guard<nb::gil_scoped_release>(),
-          "Classic method: direct light at once, indirect light to follow.")
+          "start_worker", [](Session& s) { s.worker = std::make_unique<RelightWorker>(s.engine, s.present); },
+          nb::call_guard<nb::gil_scoped_release>(), "Begins to relight on a thread of its own.")
       .def(
-          "continue_relight", [](Session& s, int shots) { return s.engine.continue_relight(*s.in_steps, shots); },
-          "shots"_a, nb::call_guard<nb::gil_scoped_release>(), "Shoots at most so often; whether more is to come.")
+          "stop_worker", [](Session& s) { s.worker.reset(); }, nb::call_guard<nb::gil_scoped_release>())
+      .def(
+          "submit", [](Session& s, const Condition& c) { return s.worker->submit(c); }, "condition"_a,
+          nb::call_guard<nb::gil_scoped_release>(), "Gives the worker a condition; its number.")
+      .def(
+          "take_latest", [](Session& s) { return s.take(s.worker->latest()); },
+          nb::call_guard<nb::gil_scoped_release>(),
+          "Makes the worker's newest state the present light; number of its condition, and whether it is complete.")
+      .def(
+          "take_finished", [](Session& s) { return s.take(s.worker->finished()); },
+          nb::call_guard<nb::gil_scoped_release>(), "The same, once the newest condition is complete.")
       .def(
           "render",
           [](Session& s, const View& view, Visibility visibility, int edge_samples, bool components) {

@@ -12,6 +12,18 @@ constexpr std::uint32_t kAuditSeed = 0x5eed0a0d;
 
 }  // namespace
 
+// Flux [lm] that a product sends into the room of the flux that arrives by incident bin.
+glm::dvec3 Engine::through_product(const Panel& panel, const std::vector<glm::dvec3>& arriving) const {
+  const std::vector<float>& transmission = products_[static_cast<std::size_t>(panel.opening)].transmission;
+  glm::dvec3 sum(0);
+  for (std::size_t out = 0; out < arriving.size() && !transmission.empty(); ++out)
+    for (std::size_t in = 0; in < arriving.size(); ++in)
+      sum += static_cast<double>(panels_->frame(panel).bins.projected_solid_angle(static_cast<int>(out)) *
+                                 transmission[out * arriving.size() + in]) *
+             arriving[in];
+  return sum;
+}
+
 // Flux in is sampled here from the openings outwards, with rays of its own: nothing of the solve is used but the
 // radiosity of outdoor surfaces.
 EnergyAudit Engine::audit(const Lighting& lighting, int rays_per_opening) const {
@@ -43,12 +55,22 @@ EnergyAudit Engine::audit(const Lighting& lighting, int rays_per_opening) const 
       rays[i] = {places[i], frame_from_normal(face.normal) * sample_cosine_hemisphere({u.x, u.y})};
     }
     rays_->intersect(RayScene::What::kOpaque, rays, hits);
+    const Panel* panel = panels_->at(static_cast<int>(f));
+    std::vector<glm::dvec3> arriving(panel ? group.panel->bins.count() : 0, glm::dvec3(0));  // flux by incident bin
     for (std::size_t i = 0; i < rays.size(); ++i) {
       if (hits[i].face >= 0 && faces_.is_inside_solid(hits[i].face, hits[i].side)) continue;
       Ray beyond = rays[i];
       if (hits[i].face >= 0) beyond.t_far = hits[i].t;
-      const float share = kPi * flux_share * group.transmittance_at(glm::dot(rays[i].direction, face.normal)) *
-                          rays_->transmittance(beyond);
+      const float share = kPi * flux_share * rays_->transmittance(beyond) *
+                          (panel ? 1.f : group.transmittance_at(glm::dot(rays[i].direction, face.normal)));
+      if (panel) {
+        const int bin = (*sky_index_)(rays[i].direction);
+        const glm::vec3 radiance = hits[i].face >= 0 ? element_radiosity(mesh_->element_at(hits[i])) / kPi
+                                   : bin == ground   ? condition.ground_luminance
+                                                     : condition.sky_luminance[bin] * condition.sky_colour;
+        arriving[panels_->bin(*panel, -rays[i].direction) - panel->first_bin] += glm::dvec3(share * radiance);
+        continue;
+      }
       if (hits[i].face >= 0) {
         audit.in_reflected += glm::dvec3(share / kPi * element_radiosity(mesh_->element_at(hits[i])));
       } else {
@@ -57,16 +79,30 @@ EnergyAudit Engine::audit(const Lighting& lighting, int rays_per_opening) const 
             share * (bin == ground ? condition.ground_luminance : condition.sky_luminance[bin] * condition.sky_colour));
       }
     }
+    if (panel) audit.in_sky += through_product(*panel, arriving);
     for (const Beam& beam : condition.beams) {
       const float cosine = glm::dot(face.normal, beam.direction_to_source);
-      if (cosine <= 0) continue;
-      for (std::size_t i = 0; i < rays.size(); ++i) rays[i] = {places[i], beam.direction_to_source};
+      if (cosine <= 0 || beam.opening != (panel ? opening : -1)) continue;
+      const float passes = panel ? 1.f : group.transmittance_at(cosine);
+      const glm::vec3 sun = panel ? beam.direction_to_sun : beam.direction_to_source;
+      for (std::size_t i = 0; i < rays.size(); ++i) rays[i] = {places[i], sun};
       rays_->occluded(RayScene::What::kOpaque, rays, blocked);
       for (std::size_t i = 0; i < rays.size(); ++i)
         if (!blocked[i])
           audit.in_beams +=
               glm::dvec3(beam.normal_illuminance) *
-              static_cast<double>(flux_share * cosine * group.transmittance_at(cosine) * rays_->transmittance(rays[i]));
+              static_cast<double>(flux_share * cosine * passes * rays_->transmittance(rays[i]));
+    }
+    for (const Residual& residual : condition.residuals) {
+      if (!panel || residual.opening != opening) continue;
+      for (std::size_t i = 0; i < rays.size(); ++i) rays[i] = {places[i], residual.direction_to_sun};
+      rays_->occluded(RayScene::What::kOpaque, rays, blocked);
+      double sunlit = 0;
+      for (std::size_t i = 0; i < rays.size(); ++i)
+        if (!blocked[i]) sunlit += static_cast<double>(flux_share * rays_->transmittance(rays[i]));
+      for (int bin = 0; bin < group.panel->bins.count(); ++bin)
+        audit.in_beams +=
+            sunlit * static_cast<double>(group.panel->bins.projected_solid_angle(bin)) * glm::dvec3(residual.radiance[bin]);
     }
   }
   for (const PointSource& source : scene_.point_sources) audit.in_emitted += glm::dvec3(4 * kPi * source.intensity);

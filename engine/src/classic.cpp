@@ -13,7 +13,7 @@ namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr std::size_t kBlock = 512;    // rays traced together
 constexpr int kMaximumCrossings = 16;  // openings passed, one behind another
-constexpr std::uint64_t kSunStream = 1, kSkyStream = 2, kPointStream = 3;
+constexpr std::uint64_t kSunStream = 1, kSkyStream = 2, kPointStream = 3, kPanelStream = 4;
 
 glm::vec3 point_of_triangle(const glm::vec3 corner[3], glm::vec2 u) {
   const glm::vec2 b = sample_triangle(u);
@@ -27,39 +27,53 @@ float channel_sum(glm::vec3 v) {
 }  // namespace
 
 ForwardRays::ForwardRays(const LightMesh& mesh, const RayScene& rays, const std::vector<Material>& materials,
-                         const std::vector<OpeningGroup>& openings, ForwardRayCounts counts, std::uint32_t seed)
-    : mesh_(mesh), rays_(rays), materials_(materials), openings_(openings), counts_(counts), seed_(seed) {
-  for (const Face& face : mesh.faces().faces) {
+                         const std::vector<OpeningGroup>& openings, const Panels& panels, ForwardRayCounts counts,
+                         std::uint32_t seed)
+    : mesh_(mesh),
+      rays_(rays),
+      materials_(materials),
+      openings_(openings),
+      panels_(panels),
+      counts_(counts),
+      seed_(seed) {
+  for (std::size_t f = 0; f < mesh.faces().faces.size(); ++f) {
+    const Face& face = mesh.faces().faces[f];
     const int opening = materials[static_cast<std::size_t>(face.material)].opening;
     if (opening < 0) continue;
     for (int part = 0; part < (face.is_quad ? 2 : 1); ++part) {
       const glm::vec3 a = face.corner[0], b = face.corner[1 + part], c = face.corner[2 + part];
       const float area = 0.5f * glm::length(glm::cross(b - a, c - a));
-      triangles_.push_back({{a, b, c}, face.normal, area, opening});
+      triangles_.push_back({{a, b, c}, face.normal, area, static_cast<int>(f), opening});
       total_area_ += area;
     }
   }
 }
 
-// Parallel rays, shared among the openings that face the beam by the area that they show it.
+// Parallel rays, shared among the openings that face the beam by the area that they show it. Of a lobe: from all over
+// its panels, each ray if the sun reaches the point where it starts.
 std::vector<ForwardRays::Arrival> ForwardRays::sun_arrivals(const Beam& beam) const {
   std::vector<Arrival> arrivals;
   float shown_area = 0;
+  const auto takes_part = [&](const OpeningTriangle& t) {
+    return beam.opening < 0 ? !panels_.at(t.face) : t.opening == beam.opening;
+  };
   for (const OpeningTriangle& t : triangles_)
-    shown_area += t.area * std::max(0.f, glm::dot(t.normal, beam.direction_to_source));
+    if (takes_part(t)) shown_area += t.area * std::max(0.f, glm::dot(t.normal, beam.direction_to_source));
   if (!(shown_area > 0)) return arrivals;
   for (std::size_t k = 0; k < triangles_.size(); ++k) {
     const OpeningTriangle& t = triangles_[k];
     const float cosine = glm::dot(t.normal, beam.direction_to_source);
-    if (cosine <= 0) continue;
+    if (cosine <= 0 || !takes_part(t)) continue;
     const float shown = t.area * cosine;
     const int count = std::max(1, static_cast<int>(std::lround(static_cast<double>(counts_.sun) * shown / shown_area)));
-    const glm::vec3 flux = beam.normal_illuminance * (shown / static_cast<float>(count)) *
-                           openings_[static_cast<std::size_t>(t.opening)].transmittance_at(cosine);
+    const float passes =
+        beam.opening < 0 ? openings_[static_cast<std::size_t>(t.opening)].transmittance_at(cosine) : 1.f;
+    const glm::vec3 flux = beam.normal_illuminance * (shown / static_cast<float>(count) * passes);
+    const glm::vec3 outwards = beam.opening < 0 ? beam.direction_to_source : beam.direction_to_sun;
     const SobolSequence points(hash_seed(seed_, hash_seed(kSunStream, k)));
     for (int i = 0; i < count; ++i)
-      arrivals.push_back(
-          {point_of_triangle(t.corner, points.point2(static_cast<std::uint32_t>(i))), beam.direction_to_source, flux});
+      arrivals.push_back({point_of_triangle(t.corner, points.point2(static_cast<std::uint32_t>(i))), outwards,
+                          -beam.direction_to_source, flux});
   }
   return arrivals;
 }
@@ -101,7 +115,31 @@ std::vector<ForwardRays::Arrival> ForwardRays::sky_arrivals(const Condition& con
         if (cosine <= 0) continue;
         const float passes =
             openings_[static_cast<std::size_t>(place.triangle->opening)].transmittance_at(cosine) * cosine;
-        arrivals.push_back({place.point, direction, luminance * (solid_angle * area * passes)});
+        if (passes > 0) arrivals.push_back({place.point, direction, -direction, luminance * (solid_angle * area * passes)});
+      }
+    }
+  }
+  return arrivals;
+}
+
+// From points all over each panel into every exit bin.
+std::vector<ForwardRays::Arrival> ForwardRays::panel_arrivals(const std::vector<glm::vec3>& panel_radiance) const {
+  std::vector<Arrival> arrivals;
+  const int count = counts_.panel_bin_rays;
+  for (std::size_t k = 0; k < triangles_.size(); ++k) {
+    const OpeningTriangle& t = triangles_[k];
+    const Panel* panel = panels_.at(t.face);
+    if (!panel) continue;
+    const PanelFrame& frame = panels_.frame(*panel);
+    for (int bin = 0; bin < frame.bins.count(); ++bin) {
+      const glm::vec3 radiance = panel_radiance[static_cast<std::size_t>(panel->first_bin + bin)];
+      if (radiance == glm::vec3(0)) continue;
+      const glm::vec3 flux = radiance * (t.area * frame.bins.projected_solid_angle(bin) / static_cast<float>(count));
+      const SobolSequence points(hash_seed(seed_, hash_seed(kPanelStream + k, static_cast<std::uint64_t>(bin))));
+      for (int i = 0; i < count; ++i) {
+        const glm::vec4 u = points.point4(static_cast<std::uint32_t>(i));
+        arrivals.push_back({point_of_triangle(t.corner, {u.z, u.w}), glm::vec3(0),
+                            frame.to_world(frame.bins.sample(bin, {u.x, u.y})), flux});
       }
     }
   }
@@ -121,7 +159,8 @@ void ForwardRays::deposit(const std::vector<Arrival>& arrivals, const std::vecto
     std::vector<float> outdoors(size);
     for (std::size_t i = 0; i < size; ++i) {
       const Arrival& a = arrivals[begin + i];
-      outward[i] = {a.point, a.direction, offset};
+      const bool has_arrived = a.outwards == glm::vec3(0);
+      outward[i] = {a.point, has_arrived ? a.inwards : a.outwards, offset, has_arrived ? 2 * offset : Ray::kInfinity};
     }
     rays_.occluded(RayScene::What::kOpaque, outward, blocked);
     rays_.transmittance(outward, outdoors);
@@ -137,7 +176,7 @@ void ForwardRays::deposit(const std::vector<Arrival>& arrivals, const std::vecto
       inward.clear();
       for (const std::size_t i : active) {
         const Arrival& a = arrivals[begin + i];
-        inward.push_back({a.point, -a.direction, starts[i]});
+        inward.push_back({a.point, a.inwards, starts[i]});
       }
       hits.resize(inward.size());
       rays_.intersect(RayScene::What::kAll, inward, hits);
@@ -164,8 +203,9 @@ void ForwardRays::deposit(const std::vector<Arrival>& arrivals, const std::vecto
     if (patches[i] >= 0) flux[static_cast<std::size_t>(patches[i])] += shares[i] * arrivals[i].flux;
 }
 
-ForwardLight ForwardRays::cast(const Condition& condition, const SkyBinIndex& sky,
-                               const std::vector<int>& patch_of_slot, const std::vector<float>& patch_area) const {
+ForwardLight ForwardRays::cast(const Condition& condition, const std::vector<glm::vec3>& panel_radiance,
+                               const SkyBinIndex& sky, const std::vector<int>& patch_of_slot,
+                               const std::vector<float>& patch_area) const {
   ForwardLight light;
   light.sun.assign(patch_area.size(), glm::vec3(0));
   light.sky.assign(patch_area.size(), glm::vec3(0));
@@ -177,6 +217,9 @@ ForwardLight ForwardRays::cast(const Condition& condition, const SkyBinIndex& sk
   const std::vector<Arrival> arrivals = sky_arrivals(condition, sky);
   light.ray_count += static_cast<int>(arrivals.size());
   deposit(arrivals, patch_of_slot, light.sky);
+  const std::vector<Arrival> from_panels = panel_arrivals(panel_radiance);
+  light.ray_count += static_cast<int>(from_panels.size());
+  deposit(from_panels, patch_of_slot, light.sky);
   for (std::size_t p = 0; p < patch_area.size(); ++p) {
     light.sun[p] /= patch_area[p];
     light.sky[p] /= patch_area[p];

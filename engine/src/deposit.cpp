@@ -4,46 +4,89 @@
 #include <cmath>
 #include <numeric>
 
+#include "transom/beam_outlines.h"
 #include "transom/parallel.h"
 #include "transom/sampling.h"
 
 namespace transom {
 namespace {
 
-constexpr int kSamplesPerElement = 4;          // of a beam, to find out which patches are lit, and wholly or partly
-constexpr int kRefinedSamplesPerElement = 32;  // on patches that are partly lit
+constexpr int kSamplesPerElement = 4;          // of a beam
+constexpr int kTellingSamples = 2;             // of these, the ones that say whether an element is partly lit
+constexpr int kRefinedSamplesPerElement = 32;  // at the edges of light
 constexpr int kSourceSamplesPerElement = 16;   // of point sources
 constexpr float kSameShare = 1e-3f;            // of a beam, between samples of an evenly lit element
-constexpr std::size_t kGrain = 16;
+constexpr std::size_t kGrain = 4;
 constexpr std::uint32_t kRaysPerSmallOpening = 256;
 constexpr float kGrazingCosine = 1e-3f;  // below it a small opening lets nothing through
+constexpr std::uint32_t kPatternCount = 64;
+constexpr std::uint32_t kPatternPoints = 32;
+static_assert(kPatternPoints >= kRefinedSamplesPerElement && kPatternPoints >= kSourceSamplesPerElement);
 
 }  // namespace
+
+// Places of samples in an element, evenly spread: a choice of patterns, so that neighbours do not repeat each other.
+class DirectLight::Patterns {
+ public:
+  explicit Patterns(std::uint32_t seed) : seed_(seed) {
+    for (std::uint32_t pattern = 0; pattern < kPatternCount; ++pattern) {
+      const SobolSequence sequence(hash_seed(seed, pattern));
+      for (std::uint32_t i = 0; i < kPatternPoints; ++i) points_.push_back(sequence.point2(i));
+    }
+  }
+  std::span<const glm::vec2> of(int element) const {
+    const std::uint32_t pattern = hash_seed(seed_, static_cast<std::uint64_t>(element)) % kPatternCount;
+    return {&points_[static_cast<std::size_t>(pattern) * kPatternPoints], kPatternPoints};
+  }
+
+ private:
+  std::uint32_t seed_;
+  std::vector<glm::vec2> points_;
+};
+
+DirectLight::Receivers DirectLight::receivers(const std::vector<int>& slots,
+                                              std::vector<char> is_behind_openings) const {
+  Receivers receivers{slots, std::move(is_behind_openings), {}, {}};
+  receivers.is_behind_openings.resize(slots.size(), 0);
+  for (const int slot_index : slots) {
+    const Slot slot = mesh_.slot(slot_index);
+    const Face& face = mesh_.faces().faces[slot.face];
+    const auto corner = [&](float u, float v) {
+      return mesh_.lifted_position(slot.face, slot.side, mesh_.cell_parameters(slot.face, slot.cell, {u, v}));
+    };
+    receivers.corners.push_back({corner(0, 0), corner(1, 0), face.is_quad ? corner(1, 1) : corner(0, 1), corner(0, 1)});
+    receivers.normals.push_back(slot.side == 0 ? face.normal : -face.normal);
+  }
+  return receivers;
+}
 
 DirectLight::DirectLight(const LightMesh& mesh, const RayScene& rays, const std::vector<PointSource>& sources,
                          const std::vector<Material>& materials, float small_opening_m2)
     : mesh_(mesh), rays_(rays), is_small_opening_(mesh.faces().faces.size(), 0) {
   for (std::size_t f = 0; f < is_small_opening_.size(); ++f) {
     const Face& face = mesh.faces().faces[f];
-    if (materials[face.material].opening < 0 || face.area >= small_opening_m2) continue;
-    small_openings_.push_back(static_cast<int>(f));
-    is_small_opening_[f] = 1;
+    if (materials[face.material].opening < 0) continue;
+    is_small_opening_[f] = face.area < small_opening_m2;
+    (is_small_opening_[f] ? small_openings_ : large_openings_).push_back(static_cast<int>(f));
   }
   for (const PointSource& source : sources)
     sources_.push_back({glm::vec3(source.position - mesh.faces().origin), source.intensity});
 }
 
-void DirectLight::beam_transmission(glm::vec3 direction, std::span<const glm::vec3> points,
-                                    std::span<float> share) const {
+void DirectLight::beam_transmission(const Beam& beam, std::span<const glm::vec3> points, std::span<float> share) const {
+  if (beam.opening >= 0) {
+    shaft_transmission(beam, points, share);
+    return;
+  }
   std::vector<Ray> rays(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) rays[i] = {points[i], direction};
+  for (std::size_t i = 0; i < points.size(); ++i) rays[i] = {points[i], beam.direction_to_source};
   std::vector<std::uint8_t> blocked(points.size());
   rays_.occluded(RayScene::What::kOpaque, rays, blocked, RayScene::Order::kCoherent);
   std::vector<Ray> free_rays;
   for (std::size_t i = 0; i < points.size(); ++i)
     if (!blocked[i]) free_rays.push_back(rays[i]);
   std::vector<float> transmitted(free_rays.size());
-  rays_.transmittance(free_rays, transmitted);
+  rays_.transmittance(free_rays, transmitted, RayScene::Order::kCoherent);
   for (std::size_t i = 0, next = 0; i < points.size(); ++i) share[i] = blocked[i] ? 0 : transmitted[next++];
 }
 
@@ -67,31 +110,27 @@ glm::vec3 DirectLight::illuminance(const std::vector<Beam>& beams, glm::vec3 poi
     const float cosine = glm::dot(beam.direction_to_source, normal);
     if (cosine <= 0) continue;
     float share = 0;
-    beam_transmission(beam.direction_to_source, {&point, 1}, {&share, 1});
+    beam_transmission(beam, {&point, 1}, {&share, 1});
     sum += beam.normal_illuminance * (cosine * share);
   }
   return sum;
 }
 
 // Lifted points of some elements of a slot, `samples` each.
-std::vector<glm::vec3> DirectLight::points_on(int slot_index, std::span<const int> elements, int samples,
-                                              std::uint32_t seed) const {
+std::vector<glm::vec3> DirectLight::points_on(int slot_index, const Corners& corners, std::span<const int> elements,
+                                              int samples, const Patterns& patterns) const {
   const Slot slot = mesh_.slot(slot_index);
   std::vector<glm::vec3> points;
   points.reserve(elements.size() * static_cast<std::size_t>(samples));
   const bool is_quad = mesh_.grid(slot.face).is_quad;
-  const int edge = static_cast<int>(std::lround(std::sqrt(static_cast<float>(mesh_.elements_per_slot()))));
+  const int per_slot = mesh_.elements_per_slot(),
+            edge = static_cast<int>(std::lround(std::sqrt(static_cast<float>(per_slot))));
   // A cell, and a quad's element in it, is the affine or bilinear picture of its own square or triangle.
-  const auto corner = [&](float u, float v) {
-    return mesh_.lifted_position(slot.face, slot.side, mesh_.cell_parameters(slot.face, slot.cell, {u, v}));
-  };
-  const glm::vec3 a = corner(0, 0), ab = corner(1, 0) - a, ac = corner(0, 1) - a,
-                  twist = is_quad ? corner(1, 1) - a - ab - ac : glm::vec3(0);
+  const glm::vec3 a = corners[0], ab = corners[1] - a, ac = corners[3] - a, twist = corners[2] - a - ab - ac;
   for (const int e : elements) {
-    const SobolSequence sequence(
-        hash_seed(seed, static_cast<std::uint64_t>(slot_index) * mesh_.elements_per_slot() + e));
+    const std::span<const glm::vec2> pattern = patterns.of(slot_index * per_slot + e);
     for (int i = 0; i < samples; ++i) {
-      const glm::vec2 local = mesh_.sample_local(slot.face, sequence.point2(static_cast<std::uint32_t>(i)));
+      const glm::vec2 local = mesh_.sample_local(slot.face, pattern[static_cast<std::size_t>(i)]);
       if (is_quad) {
         const glm::vec2 u = (glm::vec2(e % edge, e / edge) + local) / static_cast<float>(edge);
         points.push_back(a + u.x * ab + u.y * ac + u.x * u.y * twist);
@@ -104,56 +143,120 @@ std::vector<glm::vec3> DirectLight::points_on(int slot_index, std::span<const in
   return points;
 }
 
-// Mean share of a beam on each element of a slot. Few samples tell patches that are wholly lit or dark from the others,
-// which are sampled densely throughout: light thinner than the distance of samples is then missed and found alike.
-void DirectLight::beam_on_slot(glm::vec3 direction, int slot_index, std::uint32_t seed,
-                               std::vector<float>& mean) const {
-  const int element_count = mesh_.elements_per_slot();
-  std::vector<int> elements(static_cast<std::size_t>(element_count));
+// The few samples that every element of the candidates has: share of a beam, kSamplesPerElement an element.
+std::vector<float> DirectLight::sample_sun(const Beam& sun, const Receivers& receivers,
+                                           const std::vector<std::size_t>& candidates, const Patterns& patterns) const {
+  std::vector<int> elements(static_cast<std::size_t>(mesh_.elements_per_slot()));
   std::iota(elements.begin(), elements.end(), 0);
-  std::vector<float> share(static_cast<std::size_t>(element_count * kSamplesPerElement));
-  std::vector<glm::vec3> points = points_on(slot_index, elements, kSamplesPerElement, seed);
-  beam_transmission(direction, points, share);
-  ignore_small_openings(direction, points, share);
-  const auto [least, most] = std::minmax_element(share.begin(), share.end());
-  mean.assign(static_cast<std::size_t>(element_count), *most);
-  if (*most - *least <= kSameShare) return;
-  share.resize(elements.size() * kRefinedSamplesPerElement);
-  points = points_on(slot_index, elements, kRefinedSamplesPerElement, seed);
-  beam_transmission(direction, points, share);
-  ignore_small_openings(direction, points, share);
-  for (std::size_t k = 0; k < elements.size(); ++k)
-    mean[elements[k]] = std::accumulate(&share[k * kRefinedSamplesPerElement],
-                                        &share[k * kRefinedSamplesPerElement] + kRefinedSamplesPerElement, 0.f) /
-                        kRefinedSamplesPerElement;
+  const std::size_t samples_per_slot = elements.size() * kSamplesPerElement;
+  std::vector<float> share(candidates.size() * samples_per_slot);
+  parallel_indices(candidates.size(), kGrain, [&](std::size_t k) {
+    const std::size_t i = candidates[k];
+    const std::vector<glm::vec3> points =
+        points_on(receivers.slots[i], receivers.corners[i], elements, kSamplesPerElement, patterns);
+    const std::span<float> of_slot(&share[k * samples_per_slot], samples_per_slot);
+    beam_transmission(sun, points, of_slot);
+    ignore_small_openings(sun.direction_to_source, points, of_slot);
+  });
+  return share;
 }
 
-void DirectLight::deposit_on_slot(const std::vector<Beam>& beams, int slot_index, std::uint32_t seed,
-                                  std::vector<LitElement>& lit) const {
+// The elements of a slot whose telling samples differ from each other or from those of an element beside them, in the
+// same face. Patches without samples are dark. In triangles, the elements of a patch are all beside each other.
+std::vector<int> DirectLight::partly_lit(int slot_index, const std::vector<int>& place_of_slot,
+                                         const std::vector<float>& share) const {
   const Slot slot = mesh_.slot(slot_index);
-  const Face& face = mesh_.faces().faces[slot.face];
-  const glm::vec3 normal = slot.side == 0 ? face.normal : -face.normal;
-  const int element_count = mesh_.elements_per_slot();
-  std::vector<glm::vec3> sum;
-  std::vector<float> mean;
-  for (const Beam& beam : beams) {
-    const float cosine = glm::dot(beam.direction_to_source, normal);
-    if (cosine <= 0 || beam.normal_illuminance == glm::vec3(0)) continue;
-    beam_on_slot(beam.direction_to_source, slot_index, seed, mean);
-    sum.resize(static_cast<std::size_t>(element_count), glm::vec3(0));
-    for (int e = 0; e < element_count; ++e) sum[e] += beam.normal_illuminance * (cosine * mean[e]);
+  const Grid& grid = mesh_.grid(slot.face);
+  const int per_slot = mesh_.elements_per_slot(),
+            edge = static_cast<int>(std::lround(std::sqrt(static_cast<float>(per_slot))));
+  const auto sample = [&](int of_slot, int element, int i) {
+    const int place = place_of_slot[of_slot];
+    return place < 0 ? 0.f : share[static_cast<std::size_t>((place * per_slot + element) * kSamplesPerElement + i)];
+  };
+  std::vector<int> found;
+  for (int e = 0; e < per_slot; ++e) {
+    const float own = sample(slot_index, e, 0);
+    bool differs = false;
+    const auto compare = [&](int of_slot, int element) {
+      for (int i = 0; i < kTellingSamples; ++i) differs |= std::abs(sample(of_slot, element, i) - own) > kSameShare;
+    };
+    if (!grid.is_quad) {
+      for (int other = 0; other < per_slot; ++other) compare(slot_index, other);
+    } else {
+      const int x = slot.cell % grid.u_count * edge + e % edge, y = slot.cell / grid.u_count * edge + e / edge;
+      for (int v = std::max(0, y - 1); v <= std::min(grid.v_count * edge - 1, y + 1); ++v)
+        for (int u = std::max(0, x - 1); u <= std::min(grid.u_count * edge - 1, x + 1); ++u)
+          compare(mesh_.slot_index(slot.face, slot.side, v / edge * grid.u_count + u / edge),
+                  v % edge * edge + u % edge);
+    }
+    if (differs) found.push_back(e);
   }
-  if (!sources_.empty()) {
-    std::vector<int> elements(static_cast<std::size_t>(element_count));
-    std::iota(elements.begin(), elements.end(), 0);
-    const std::vector<glm::vec3> points = points_on(slot_index, elements, kSourceSamplesPerElement, seed);
-    sum.resize(static_cast<std::size_t>(element_count), glm::vec3(0));
-    for (std::size_t i = 0; i < points.size(); ++i)
-      sum[i / kSourceSamplesPerElement] +=
-          point_source_illuminance(points[i], normal) / static_cast<float>(kSourceSamplesPerElement);
+  return found;
+}
+
+// Adds the sun to the light of elements, by receiver. Elements at the edges of light, as two samples of each tell, are
+// sampled densely; the others keep two samples that did not tell: then the thin shadows that none of them found are, in
+// the mean, made up for.
+void DirectLight::add_sun(const Beam& sun, const Receivers& receivers, const Patterns& patterns,
+                          std::vector<std::vector<glm::vec3>>& sum) const {
+  const std::vector<std::size_t> candidates = reached(sun.direction_to_source, receivers);
+  const std::vector<float> share = sample_sun(sun, receivers, candidates, patterns);
+  std::vector<int> place_of_slot(static_cast<std::size_t>(mesh_.slot_count()), -1);
+  for (std::size_t k = 0; k < candidates.size(); ++k)
+    place_of_slot[receivers.slots[candidates[k]]] = static_cast<int>(k);
+  const int per_slot = mesh_.elements_per_slot();
+  parallel_indices(candidates.size(), kGrain, [&](std::size_t k) {
+    const std::size_t i = candidates[k];
+    const glm::vec3 full = sun.normal_illuminance * glm::dot(sun.direction_to_source, receivers.normals[i]);
+    const float* own = &share[k * static_cast<std::size_t>(per_slot * kSamplesPerElement)];
+    std::vector<float> mean(static_cast<std::size_t>(per_slot));
+    for (int e = 0; e < per_slot; ++e)
+      mean[e] =
+          std::accumulate(own + e * kSamplesPerElement + kTellingSamples, own + (e + 1) * kSamplesPerElement, 0.f) /
+          static_cast<float>(kSamplesPerElement - kTellingSamples);
+    const std::vector<int> elements = partly_lit(receivers.slots[i], place_of_slot, share);
+    std::vector<float> refined(elements.size() * kRefinedSamplesPerElement);
+    const std::vector<glm::vec3> points =
+        points_on(receivers.slots[i], receivers.corners[i], elements, kRefinedSamplesPerElement, patterns);
+    beam_transmission(sun, points, refined);
+    ignore_small_openings(sun.direction_to_source, points, refined);
+    for (std::size_t n = 0; n < elements.size(); ++n)
+      mean[elements[n]] = std::accumulate(&refined[n * kRefinedSamplesPerElement],
+                                          &refined[n * kRefinedSamplesPerElement] + kRefinedSamplesPerElement, 0.f) /
+                          kRefinedSamplesPerElement;
+    sum[i].resize(static_cast<std::size_t>(per_slot), glm::vec3(0));
+    for (int e = 0; e < per_slot; ++e) sum[i][e] += mean[e] * full;
+  });
+}
+
+void DirectLight::sources_on_slot(int slot_index, const Corners& corners, glm::vec3 normal, const Patterns& patterns,
+                                  std::vector<glm::vec3>& sum) const {
+  std::vector<int> elements(static_cast<std::size_t>(mesh_.elements_per_slot()));
+  std::iota(elements.begin(), elements.end(), 0);
+  const std::vector<glm::vec3> points = points_on(slot_index, corners, elements, kSourceSamplesPerElement, patterns);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    sum[i / kSourceSamplesPerElement] +=
+        point_source_illuminance(points[i], normal) / static_cast<float>(kSourceSamplesPerElement);
+}
+
+// The receivers that a beam may reach.
+std::vector<std::size_t> DirectLight::reached(glm::vec3 direction, const Receivers& receivers) const {
+  std::vector<std::size_t> found;
+  const BeamOutlines outlines(mesh_.faces(), large_openings_, direction);
+  int known_face = -1;
+  std::vector<int> passages;  // over that face
+  for (std::size_t i = 0; i < receivers.slots.size(); ++i) {
+    if (glm::dot(direction, receivers.normals[i]) <= 0) continue;
+    if (receivers.is_behind_openings[i]) {
+      const int f = mesh_.slot(receivers.slots[i]).face;
+      const Face& face = mesh_.faces().faces[f];
+      if (f != known_face) outlines.covering(outlines.outline({face.corner, face.is_quad ? 4u : 3u}), passages);
+      known_face = f;
+      if (passages.empty() || !outlines.is_covered(outlines.outline(receivers.corners[i]), passages)) continue;
+    }
+    found.push_back(i);
   }
-  for (std::size_t e = 0; e < sum.size(); ++e)
-    if (sum[e] != glm::vec3(0)) lit.push_back({slot_index * element_count + static_cast<int>(e), sum[e]});
+  return found;
 }
 
 // Takes the light away that comes to the points through a small opening first.
@@ -183,6 +286,7 @@ std::map<int, glm::vec3> DirectLight::send_through_small_openings(const std::vec
   std::vector<Hit> hits(kRaysPerSmallOpening);
   for (const int f : small_openings_)
     for (const Beam& beam : beams) {
+      if (beam.opening >= 0) continue;
       const Face& face = mesh_.faces().faces[f];
       const float cosine = glm::dot(face.normal, beam.direction_to_source);
       if (std::abs(cosine) < kGrazingCosine) continue;
@@ -194,7 +298,7 @@ std::map<int, glm::vec3> DirectLight::send_through_small_openings(const std::vec
         places[i] = face.position(face.is_quad ? u : sample_triangle(u)) + beyond;
         onwards[i] = {places[i], -beam.direction_to_source};
       }
-      beam_transmission(beam.direction_to_source, places, share);
+      beam_transmission(beam, places, share);
       rays_.intersect(RayScene::What::kAll, onwards, hits);
       const float flux_share = face.area * std::abs(cosine) / static_cast<float>(kRaysPerSmallOpening);
       for (std::size_t i = 0; i < hits.size(); ++i) {
@@ -209,26 +313,33 @@ std::map<int, glm::vec3> DirectLight::send_through_small_openings(const std::vec
   return sent;
 }
 
-std::vector<LitElement> DirectLight::deposit(const std::vector<Beam>& beams, const std::vector<int>& slots,
+std::vector<LitElement> DirectLight::deposit(const std::vector<Beam>& beams, const Receivers& receivers,
                                              std::uint32_t seed) const {
   std::vector<LitElement> lit;
   if (beams.empty() && sources_.empty()) return lit;
-  std::vector<std::vector<LitElement>> by_slot(slots.size());
-  parallel_indices(slots.size(), kGrain, [&](std::size_t i) { deposit_on_slot(beams, slots[i], seed, by_slot[i]); });
-  const std::map<int, glm::vec3> sent = send_through_small_openings(beams, seed);
-  for (std::size_t i = 0; i < slots.size() && !sent.empty(); ++i) {
-    const int first = slots[i] * mesh_.elements_per_slot(), last = first + mesh_.elements_per_slot();
-    for (auto entry = sent.lower_bound(first); entry != sent.end() && entry->first < last; ++entry) {
-      const int element = entry->first;
-      const auto known = std::find_if(by_slot[i].begin(), by_slot[i].end(),
-                                      [element](const LitElement& e) { return e.element == element; });
-      if (known == by_slot[i].end())
-        by_slot[i].push_back({element, entry->second});
-      else
-        known->illuminance += entry->second;
-    }
+  const Patterns patterns(seed);
+  const int per_slot = mesh_.elements_per_slot();
+  std::vector<std::vector<glm::vec3>> sum(receivers.slots.size());  // by element, or empty
+  for (const Beam& beam : beams) {
+    if (beam.normal_illuminance == glm::vec3(0)) continue;
+    if (beam.opening < 0)
+      add_sun(beam, receivers, patterns, sum);
+    else
+      add_lobe(beam, receivers, seed, sum);
   }
-  for (const std::vector<LitElement>& part : by_slot) lit.insert(lit.end(), part.begin(), part.end());
+  const std::map<int, glm::vec3> sent = send_through_small_openings(beams, seed);
+  if (!sources_.empty() || !sent.empty())
+    parallel_indices(receivers.slots.size(), kGrain, [&](std::size_t i) {
+      sum[i].resize(static_cast<std::size_t>(per_slot), glm::vec3(0));
+      if (!sources_.empty())
+        sources_on_slot(receivers.slots[i], receivers.corners[i], receivers.normals[i], patterns, sum[i]);
+      const int first = receivers.slots[i] * per_slot;
+      for (auto entry = sent.lower_bound(first); entry != sent.end() && entry->first < first + per_slot; ++entry)
+        sum[i][entry->first - first] += entry->second;
+    });
+  for (std::size_t i = 0; i < receivers.slots.size(); ++i)
+    for (std::size_t e = 0; e < sum[i].size(); ++e)
+      if (sum[i][e] != glm::vec3(0)) lit.push_back({receivers.slots[i] * per_slot + static_cast<int>(e), sum[i][e]});
   return lit;
 }
 

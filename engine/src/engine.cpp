@@ -50,7 +50,8 @@ void Engine::solve(const Engine* solved) {
                  : choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
     facts_.maximum_edge_m = *std::min_element(edges_.begin(), edges_.end());
     mesh_ = std::make_unique<LightMesh>(faces_, edges_, options_.elements_per_edge);
-    gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_);
+    panels_ = std::make_unique<Panels>(faces_, scene_.materials, scene_.openings);
+    gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_, *panels_);
     const float element_edge = facts_.maximum_edge_m / static_cast<float>(options_.elements_per_edge);
     direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources, scene_.materials,
                                                   element_edge * element_edge);
@@ -61,6 +62,7 @@ void Engine::solve(const Engine* solved) {
   {
     const TracePhase phase(trace_, "patches");
     patch_of_slot_.assign(static_cast<std::size_t>(mesh_->slot_count()), -1);
+    gather_panels();
     find_patches(first_wave(), known);
     mark_interior();
     find_unseen_patches(known);
@@ -70,6 +72,7 @@ void Engine::solve(const Engine* solved) {
   {
     const TracePhase phase(trace_, "transfer");
     assemble_transfer(known);
+    link_panels();
   }
   if (options_.method == Method::kClassic) {
     const TracePhase phase(trace_, "forward rays");
@@ -96,9 +99,10 @@ Engine::Known Engine::known_from(const Engine* solved) const {
   for (std::size_t f = 0; f < faces_.faces.size() && known.has_openings; ++f) {
     const int own = scene_.materials[faces_.faces[f].material].opening,
               other = solved->scene_.materials[solved->faces_.faces[f].material].opening;
-    known.has_openings = own < 0 ? other < 0
-                                 : other >= 0 && scene_.openings[own].transmittance ==
-                                                     solved->scene_.openings[other].transmittance;
+    known.has_openings =
+        own < 0 ? other < 0
+                : other >= 0 && scene_.openings[own].transmittance == solved->scene_.openings[other].transmittance &&
+                      scene_.openings[own].panel == solved->scene_.openings[other].panel;
   }
   return known;
 }
@@ -136,17 +140,22 @@ void Engine::assemble_transfer(const Known& known) {
   patch_reflectance_.resize(n);
   patch_emitted_.resize(n);
   std::vector<float> row_sums(n);
+  std::vector<char> is_behind_openings(n);
   for (std::size_t p = 0; p < n; ++p) {
     const PatchRow& row = patch_rows_[p];
     const Slot slot = mesh_->slot(slot_of_patch_[p]);
     patch_area_[p] = std::max(1e-6f, row.around->exposure) * mesh_->cell_area(slot.face, slot.cell);
+    for (int e = 0; e < mesh_->elements_per_slot(); ++e)
+      element_share_.push_back(mesh_->element_area(slot.face, slot.cell, e) / patch_area_[p]);
     patch_reflectance_[p] = reflectance(slot.face, slot.side);
     patch_emitted_[p] = kPi * scene_.materials[faces_.faces[slot.face].material].luminance;
     row_sums[p] = is_interior_[p] ? 1.f : 1.f - row.around->escaped;
+    is_behind_openings[p] = is_interior_[p] && row.around->escaped == 0;
     through_.append(patches_at(row.beyond->through));
     facts_.kept_patch_rows += known.has_surroundings && known.engine->patch_of_slot_[slot_of_patch_[p]] >= 0;
     patch_sky_.append(row.beyond->sky);
   }
+  receivers_ = beam_light_->receivers(slot_of_patch_, std::move(is_behind_openings));
   double emitting = 0, interior = 0;
   for (std::size_t p = 0; p < n; ++p) {
     if (is_interior_[p]) interior += patch_area_[p];
@@ -319,7 +328,7 @@ std::vector<int> Engine::beam_slots() const {
 
 void Engine::light_always() {
   const int per_slot = mesh_->elements_per_slot();
-  lit_by_sources_ = direct_light_->deposit({}, slot_of_patch_, hash_seed(options_.seed, kBeamStream));
+  lit_by_sources_ = direct_light_->deposit({}, receivers_, hash_seed(options_.seed, kBeamStream));
   bright_always_ = bright_elements(lit_by_sources_);
   if (connects_emitters_)
     for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)

@@ -36,10 +36,12 @@ std::vector<int> Engine::first_slots() const {
   return slots;
 }
 
-// Where the search for patches starts: first_slots, and what point sources light.
+// Where the search for patches starts: first_slots, what panels see outdoors, and what point sources light.
 std::vector<int> Engine::first_wave() const {
   const int per_slot = mesh_->elements_per_slot();
   std::vector<int> wave = first_slots();
+  for (const GatherRow& row : panel_rows_)
+    for (const Share& share : row.through) wave.push_back(share.index / per_slot);
   for (std::size_t i = 0; i < scene_.point_sources.size(); ++i) {
     const SobolSequence points(hash_seed(options_.seed, kSourceStream + i));
     std::vector<Ray> rays;

@@ -94,7 +94,7 @@ void FrameRenderer::find_shares(const Beam& beam, std::span<const BeamPoint> poi
   }
   if (mask_share) return;
   found.resize(facing.size());
-  engine_.direct_light().beam_transmission(beam.direction_to_source, facing_points, found);
+  engine_.direct_light().beam_transmission(beam, facing_points, found);
   for (std::size_t k = 0; k < facing.size(); ++k) shares[facing[k]] = found[k];
 }
 
@@ -238,6 +238,7 @@ Frame FrameRenderer::render(const View& view, const Lighting& lighting, FrameOpt
   }
   for (const ViewSamples::Outlook& o : samples.outlooks)
     exterior[o.pixel] += o.weight * condition.seen(o.direction, engine_.sky_index());
+  for (const ViewSamples::SeenPanel& p : samples.panels) exterior[p.pixel] += p.weight * lighting.panel_radiance[p.bin];
   if (options.components)
     parallel_indices(pixel_count, kBlock, [&](std::size_t p) {
       frame.radiance[p] = frame.sun[p] + frame.sky[p] + frame.indirect[p] + frame.emitted[p] + frame.exterior[p];

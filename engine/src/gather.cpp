@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "transom/panels.h"
 #include "transom/sampling.h"
 
 namespace transom {
@@ -29,8 +30,8 @@ void merge_shares(std::vector<Share>& shares) {
 }
 
 Gatherer::Gatherer(const LightMesh& mesh, const RayScene& rays, const std::vector<Material>& materials,
-                   const std::vector<OpeningGroup>& openings, const SkyBinIndex& sky)
-    : mesh_(mesh), rays_(rays), materials_(materials), openings_(openings), sky_(sky) {
+                   const std::vector<OpeningGroup>& openings, const SkyBinIndex& sky, const Panels& panels)
+    : mesh_(mesh), rays_(rays), materials_(materials), openings_(openings), sky_(sky), panels_(panels) {
   const std::vector<Face>& faces = mesh.faces().faces;
   for (std::size_t f = 0; f < faces.size(); ++f) {
     if (materials[faces[f].material].opening < 0) continue;
@@ -155,9 +156,16 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
   if (segments.empty()) return;
   std::vector<std::uint8_t> blocked(segments.size());
   rays_.occluded(RayScene::What::kAll, segments, blocked, RayScene::Order::kCoherent);
+  const float scale = 1 / row.exposure;
   std::size_t kept = 0;
   for (std::size_t i = 0; i < segments.size(); ++i) {
     if (blocked[i] || segments[i].t_far <= 0) continue;
+    if (const Panel* panel = panels_.at(candidates[i].face)) {
+      if (glm::dot(segments[i].direction, mesh_.faces().faces[panel->face].normal) > 0)
+        row.sky.push_back(
+            {sky_.count() + panels_.bin(*panel, -segments[i].direction), scale * candidates[i].weight});
+      continue;
+    }
     segments[kept] = segments[i];
     candidates[kept++] = candidates[i];
   }
@@ -172,7 +180,6 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
   }
   std::vector<Hit> hits(kept);
   rays_.intersect(RayScene::What::kOpaque, segments, hits, RayScene::Order::kCoherent);
-  const float scale = 1 / row.exposure;
   for (std::size_t i = 0; i < kept; ++i)
     if (hits[i].face >= 0) segments[i].t_far = hits[i].t - offset;
   std::vector<float> transmitted(kept);

@@ -151,7 +151,7 @@ void RayScene::occluded(What what, std::span<const Ray> rays, std::span<std::uin
   }
 }
 
-void RayScene::transmittance(std::span<const Ray> rays, std::span<float> shares) const {
+void RayScene::transmittance(std::span<const Ray> rays, std::span<float> shares, Order order) const {
   constexpr int kMaximumCrossings = 64;
   std::fill(shares.begin(), shares.end(), 1.f);
   if (!has_openings_ || rays.empty()) return;
@@ -160,7 +160,7 @@ void RayScene::transmittance(std::span<const Ray> rays, std::span<float> shares)
   for (std::size_t i = 0; i < rays.size(); ++i) index[i] = i;
   std::vector<Hit> hits(rays.size());
   for (int crossing = 0; crossing < kMaximumCrossings && !rest.empty(); ++crossing) {
-    intersect(What::kOpenings, rest, {hits.data(), rest.size()});
+    intersect(What::kOpenings, rest, {hits.data(), rest.size()}, order);
     std::size_t kept = 0;
     for (std::size_t k = 0; k < rest.size(); ++k) {
       const Hit& hit = hits[k];

@@ -36,7 +36,8 @@ struct Path {
   std::uint32_t history = 0;  // of ways taken: rays of one history decide evenly
 
   double chance() {
-    if (++decisions <= kEvenDecisions) return scrambled_coordinate(number, history);
+    if (++decisions <= kEvenDecisions)
+      return scrambled_coordinate(number, hash_seed(history, static_cast<std::uint64_t>(decisions)));
     stream = stream * 6364136223846793005ULL + 1442695040888963407ULL;
     return hash_seed(stream, 0) / 4294967296.0;
   }

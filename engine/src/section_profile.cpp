@@ -85,6 +85,11 @@ SectionProfile::SectionProfile(const Section& section)
     }
     shape.is_pane = line.bow == 0 && line.a.y == line.b.y && std::abs(chord - period_) <= kWholePane * period_;
     (shape.is_pane ? panes_ : others_).push_back(static_cast<int>(shapes_.size()));
+    if (!shape.is_pane) {
+      const double rise = std::abs(line.bow);  // an arc is nowhere farther from its chord
+      others_low_z_ = std::min(others_low_z_, std::min(line.a.y, line.b.y) - rise - close_);
+      others_high_z_ = std::max(others_high_z_, std::max(line.a.y, line.b.y) + rise + close_);
+    }
     shapes_.push_back(shape);
   }
 }
@@ -103,9 +108,19 @@ SectionProfile::Hit SectionProfile::nearest(glm::dvec2 place, glm::dvec2 along, 
     }
     if (best.line >= 0) best.shift = std::floor((place.x + best.t * along.x) / period_) * period_;
   }
+  // Lines that are no panes are met only between the least and the greatest z of them all.
+  double begin = 0, until = best.t;
+  if (along.y != 0) {
+    const double to_low = (others_low_z_ - place.y) / along.y, to_high = (others_high_z_ - place.y) / along.y;
+    begin = std::max(std::min(to_low, to_high), 0.0);
+    until = std::min(std::max(to_low, to_high), best.t);
+  } else if (place.y < others_low_z_ || place.y > others_high_z_) {
+    until = -1;
+  }
   const double stride = along.x != 0 ? kStride * period_ / std::abs(along.x) : 1e300;
-  for (int k = 0; k < kMaximumStrides; ++k) {
-    const double begin = k * stride, end = std::min((k + 1) * stride, best.t);
+  for (int k = 0; begin <= until; ++k, begin += stride) {
+    if (k == kMaximumStrides) return {};
+    const double end = std::min(begin + stride, until);
     const double y0 = place.x + begin * along.x, y1 = along.x != 0 ? place.x + end * along.x : place.x;
     for (const int line : others_) {
       const Shape& shape = shapes_[static_cast<std::size_t>(line)];
@@ -119,9 +134,9 @@ SectionProfile::Hit SectionProfile::nearest(glm::dvec2 place, glm::dvec2 along, 
           meet_straight(shape, place, along, close_, line, image * period_, best);
       }
     }
-    if (best.t <= (k + 1) * stride || along.x == 0) return best;
+    if (best.t <= end) break;
   }
-  return {};
+  return best;
 }
 
 bool SectionProfile::cuts(glm::dvec2 start, glm::dvec2 end, glm::dvec2 along, std::vector<double>& shares) const {

@@ -50,6 +50,7 @@ class SectionProfile {
   double reach(glm::dvec2 place, glm::dvec2 along) const;
 
   double period_, per_metre_, low_z_, high_z_, close_;
+  double others_low_z_ = 1e300, others_high_z_ = -1e300;  // of lines that are no panes
   std::vector<Shape> shapes_;
   std::vector<int> panes_, others_;
 };

@@ -57,6 +57,11 @@ void Condition::validate(int sky_bin_count) const {
       if (!(beam.normal_illuminance[c] >= 0 && std::isfinite(beam.normal_illuminance[c])))
         throw InputError("the illuminance of a beam is negative or not finite");
   }
+  for (const Residual& residual : residuals)
+    for (const glm::vec3& radiance : residual.radiance)
+      for (int c = 0; c < 3; ++c)
+        if (!(radiance[c] >= 0 && std::isfinite(radiance[c])))
+          throw InputError("the residual of a panel holds a value that is negative or not finite");
   for (int c = 0; c < 3; ++c)
     if (!(ground_luminance[c] >= 0 && std::isfinite(ground_luminance[c])) ||
         !(sky_colour[c] >= 0 && std::isfinite(sky_colour[c])))

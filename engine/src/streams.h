@@ -13,6 +13,7 @@ enum Stream : std::uint64_t {
   kAuditStream,
   kSurveyStream,
   kSourceStream,
+  kPanelStream,
   kUnseenStream = 1u << 20
 };
 

@@ -29,9 +29,8 @@ struct Path {
 
   double chance() {
     ++decisions;
-    return decisions <= kEvenDecisions
-               ? scrambled_coordinate(number, history)
-               : hash_seed(number, hash_seed(history, static_cast<std::uint64_t>(decisions))) / 4294967296.0;
+    const std::uint32_t seed = hash_seed(history, static_cast<std::uint64_t>(decisions));
+    return decisions <= kEvenDecisions ? scrambled_coordinate(number, seed) : hash_seed(number, seed) / 4294967296.0;
   }
 };
 

@@ -19,6 +19,8 @@ struct Seen {
   float through = 1;    // transmittance of the openings in front of it
   int crossings = 0;    // openings in front of it
   glm::vec3 direction;  // of the ray
+  bool ends_at_panel = false;
+  int panel_bin = -1;  // by which the panel's own light is seen; -1: none, from outdoors
 };
 
 struct SeenPane {
@@ -54,6 +56,11 @@ class Tracer {
         const int opening = engine_.scene().materials[face.material].opening;
         if (opening < 0) continue;
         if (engine_.reflectance(here.hit.face, here.hit.side) != glm::vec3(0)) panes.push_back({active_[k], here});
+        if (const Panel* panel = engine_.panels().at(here.hit.face)) {  // nothing is seen through it
+          here.panel_bin = here.hit.side == 1 ? engine_.panels().bin(*panel, -here.direction) : -1;
+          here.ends_at_panel = true;
+          continue;
+        }
         here.through *= engine_.scene().openings[opening].transmittance_at(glm::dot(face.normal, here.direction));
         ++here.crossings;
         rays_[kept] = rays_[k];
@@ -77,7 +84,7 @@ class Tracer {
 
 BeamPoint beam_point(const Engine& engine, const Seen& seen, float weight, int pixel, int sample) {
   const Hit& hit = seen.hit;
-  if (hit.face < 0) return {glm::vec3(0), glm::vec3(0), -1, 0, pixel, sample};
+  if (hit.face < 0 || seen.ends_at_panel) return {glm::vec3(0), glm::vec3(0), -1, 0, pixel, sample};
   const glm::vec3 shading = engine.faces().faces[hit.face].shading_normal(hit.st);
   return {engine.mesh().lifted_position(hit.face, hit.side, hit.st),
           hit.side == 0 ? shading : -shading,
@@ -93,12 +100,17 @@ struct RowOfPixels {
   std::vector<std::vector<Share>> smooth;
   std::vector<ViewSamples::Constant> constant;
   std::vector<ViewSamples::Outlook> outlooks;
+  std::vector<ViewSamples::SeenPanel> panels;
 };
 
 // Adds a sample to its pixel; gives the point at which beams are tested.
 BeamPoint add_sample(const Engine& engine, const Seen& seen, float weight, int pixel, int sample,
                      std::vector<Share>& smooth, RowOfPixels& row) {
   const BeamPoint point = beam_point(engine, seen, weight, pixel, sample);
+  if (seen.ends_at_panel) {
+    if (seen.panel_bin >= 0) row.panels.push_back({pixel, weight * seen.through, seen.panel_bin});
+    return point;
+  }
   if (point.surface < 0) {
     row.outlooks.push_back({pixel, weight * seen.through, seen.direction});
     return point;
@@ -202,6 +214,7 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
     on_panes.insert(on_panes.end(), row.on_panes.begin(), row.on_panes.end());
     constant.insert(constant.end(), row.constant.begin(), row.constant.end());
     outlooks.insert(outlooks.end(), row.outlooks.begin(), row.outlooks.end());
+    panels.insert(panels.end(), row.panels.begin(), row.panels.end());
     for (const std::vector<Share>& shares : row.smooth) smooth.append(shares);
   }
   edge_pixel_count = static_cast<int>(std::count(has_edge.begin(), has_edge.end(), 1));

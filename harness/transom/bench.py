@@ -19,7 +19,14 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from transom.bench_scenes import opening_face_count, with_other_glass, with_panes
+from transom.bench_scenes import (
+    beam_count,
+    has_changeable_product,
+    opening_face_count,
+    with_other_glass,
+    with_other_product,
+    with_panes,
+)
 from transom.bench_worker import SENSOR_RAYS, phase_seconds
 from transom.daylight.condition import resolve_condition
 from transom.errors import InputError, invalid_field
@@ -49,6 +56,7 @@ QuantityName = Literal[
     "load",
     "solve",
     "reglaze",
+    "new_product",
     "relight_hour",
     "relight_sky",
     "relight_overcast",
@@ -61,8 +69,7 @@ QuantityName = Literal[
 NOTES = (
     "reglaze is a whole new solve and a relighting: the engine does not yet keep what a new transmittance leaves valid",
     "relight_sky changes the sky alone and keeps the sun; the engine does all the work of a new hour",
-    "lobes are not swept: the engine has no complex fenestration yet, and one beam for the sun; relight_overcast has "
-    "none",
+    "beams are the sun and every lobe of a product that it shines on; relight_overcast has none",
     "load reads the scene's files; with solve and relight_hour it is what the paper sets against 86 s to set up a "
     "heliodon and 29 s to move its sun [Cutler et al. 2008, section 4.3.1]",
 )
@@ -254,7 +261,7 @@ def measure_point(name: str, point: Point, budget_s: float, glazings: Sequence[s
 
     add("solve", solve, 0.35, least=1)
     engine = state["engine"]
-    beams = int(sun[0].sun_direction is not None)
+    beams = beam_count(scene, sun[0])
     if whole:
         rows.insert(0, _measurement("load", point, loads, [], scene, engine, 0, 0, (0, 0)))
     add("relight_hour", lambda i: engine.relight(sun[i % len(sun)]), 0.12, beams=beams)
@@ -286,7 +293,14 @@ def measure_point(name: str, point: Point, budget_s: float, glazings: Sequence[s
         limits = tuple(limit for limit in (memory_copy(), embree_rays()) if limit is not None)
         medians = {phase.name: phase.median for row in rows for phase in row.phases}
         used = utilisations(engine, medians, limits)
-    if whole and scene.openings:
+    if whole and has_changeable_product(scene):
+
+        def new_product(index: int) -> None:
+            engine.replace_products(with_other_product(scene, index))
+            engine.relight(sun[0])
+
+        add("new_product", new_product, 0.1, beams=beams)
+    elif whole and scene.openings:
         glass = [with_other_glass(scene, share) for share in (0.9, 0.8)]
 
         def reglaze(index: int) -> None:

@@ -1,4 +1,4 @@
-"""Variants of a scene for speed sweeps: more panes of the same area, one pane alone, other glass."""
+"""Variants of a scene for speed sweeps: more panes of the same area, one pane alone, other glass, other products."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from transom.scene.model import Mesh, Scene
+from transom.daylight.condition import Condition
+from transom.fenestration.choice import choose_product, is_file
+from transom.fenestration.light import panel_light
+from transom.products import load_product
+from transom.scene.model import Mesh, Opening, Scene
 
 
 def opening_face_count(scene: Scene) -> int:
@@ -40,6 +44,35 @@ def with_other_glass(scene: Scene, share: float) -> Scene:
         for entry in scene.openings
     )
     return replace(scene, openings=openings)
+
+
+def beam_count(scene: Scene, condition: Condition) -> int:
+    """Parallel lights of a condition: the sun, and the lobes of every panel group that it shines on."""
+    if condition.sun_direction is None:
+        return 0
+    return 1 + sum(len(light.beams) for light in panel_light(scene, condition))
+
+
+def has_changeable_product(scene: Scene) -> bool:
+    """Whether an opening holds a product with parameters, not a file."""
+    return any(_is_changeable(entry) for entry in scene.openings)
+
+
+def with_other_product(scene: Scene, index: int) -> Scene:
+    """The scene with the first parameter of its first changeable product less by a thousandth, or by more for a
+    greater index: a product that was never looked at before."""
+    opening = next(entry for entry in scene.openings if _is_changeable(entry))
+    assert opening.product is not None
+    parameters = {**load_product(opening.product.name).record.parameters, **dict(opening.product.parameters)}
+    first = next(iter(parameters))
+    parameters[first] *= 1 - 1e-3 * (index + 1)
+    product = choose_product(opening.product.name, parameters)
+    openings = tuple(replace(entry, product=product) if entry is opening else entry for entry in scene.openings)
+    return replace(scene, openings=openings)
+
+
+def _is_changeable(opening: Opening) -> bool:
+    return opening.product is not None and not is_file(opening.product.name)
 
 
 def _is_opening(scene: Scene) -> NDArray[np.bool_]:

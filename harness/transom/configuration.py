@@ -135,7 +135,8 @@ def compute_plot(
     solved = time.perf_counter()
     done = 0
     for glazing, variant in scenes.items():
-        engine = with_glazing(engine, variant)
+        if engine.scene is not variant:
+            engine.replace_products(variant)
         for row, column in cells:
             if glazings[row, column] != glazing:
                 continue
@@ -155,11 +156,6 @@ def target_sensors(scene: Scene) -> tuple[SensorSet, ...]:
     if not targets:
         raise InputError("has no target sensors", file=scene.file, remedy="Set target = true in a [[sensors]] table")
     return targets
-
-
-def with_glazing(engine: Engine, scene: Scene) -> Engine:
-    """The engine for a scene that differs from its own in glazing alone."""
-    return engine if engine.scene is scene else Engine.solve(scene, engine.options)
 
 
 def csv_text(plot: Plot) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -15,7 +16,12 @@ from transom import _engine
 from transom.daylight.condition import Condition
 from transom.daylight.sky_bins import SkyBins
 from transom.errors import InputError
+from transom.fenestration.light import panel_light
+from transom.fenestration.load import load_fenestration
+from transom.fenestration.panels import panel_groups
+from transom.fenestration.through import Fenestration
 from transom.glass import diffuse_reflectance, transmittance_table
+from transom.scene import content_key
 from transom.scene.model import Scene, View
 
 Float32 = NDArray[np.float32]
@@ -38,7 +44,8 @@ class SolveOptions:
     constant patches, progressive shooting [Cutler et al. 2008].
     maximum_edge_m: of a patch [m]; 0 chooses it from target_patch_count. elements_per_edge: a patch has its square.
     patch_rays, patch_opening_rays: rays a patch, over the hemisphere and towards the openings; node_*: the same for
-    each point at which light is shown (a node). node_spacing: of nodes, against the harmonic mean distance of what
+    each point at which light is shown (a node). panel_rays: rays from each panel of a glazing product outwards, for
+    each of its incident bins. node_spacing: of nodes, against the harmonic mean distance of what
     their cell sees: smaller values put more nodes into corners and under furniture. tolerance: relative flux in flight
     at which interreflection stops. seed: of all samples.
     """
@@ -51,6 +58,7 @@ class SolveOptions:
     patch_opening_rays: int = 128
     node_rays: int = 1024
     node_opening_rays: int = 256
+    panel_rays: int = 256
     node_spacing: float = 6.0
     tolerance: float = 1e-4
     seed: int = 1
@@ -102,7 +110,9 @@ class Engine:
             core = _engine.Engine(_geometry(scene), _core_bins(sky_bins), _core_options(options, trace))
         except _engine.EngineInputError as error:
             raise InputError(_with_object_names(str(error), scene), file=scene.file) from None
-        return cls(scene, options, sky_bins, core)
+        engine = cls(scene, options, sky_bins, core)
+        engine._set_products()
+        return engine
 
     def edited(self, scene: Scene) -> Self:
         """An engine for the edited scene: equal to a fresh solve with this one's options, and faster.
@@ -115,7 +125,9 @@ class Engine:
             core = _engine.Engine(self._core, _geometry(scene))
         except _engine.EngineInputError as error:
             raise InputError(_with_object_names(str(error), scene), file=scene.file) from None
-        return type(self)(scene, self.options, self.sky_bins, core)
+        engine = type(self)(scene, self.options, self.sky_bins, core)
+        engine._set_products()
+        return engine
 
     def relight(self, condition: Condition) -> None:
         """Finds the light of a condition; the geometry is not looked at again.
@@ -127,24 +139,44 @@ class Engine:
             self._core.relight(core_condition)
         self.condition = condition
 
-    def relight_in_steps(self, condition: Condition, shots: int = 64) -> Iterator[float]:
-        """Classic method: new direct light at once, then the old indirect light replaced, `shots` patches at a time.
+    def replace_products(self, scene: Scene) -> None:
+        """Takes the products of a scene that differs in nothing else (`reglazed`), without a new solve. Relight next.
 
-        Yields the share of flux still in flight; after each, `render` and `illuminance` show a usable state. Left
-        early, the next relighting goes on from there. Raises InputError for another method.
+        Raises InputError for a scene of which more has changed, such as clear glass for a product, or the bins of the
+        product's directions; the engine then keeps the products that it had.
         """
-        if self.options.method != "classic":
-            remedy = 'Solve with method "classic"'
-            raise InputError("cannot relight in steps", field="method", value=self.options.method, remedy=remedy)
-        core_condition = self._core_condition(condition)
-        with self._input_errors(condition):
-            self._core.begin_relight(core_condition)
-        self.condition = condition
-        more = True
-        while more:
-            yield float(self._core.unshot_share)
-            more = self._core.continue_relight(shots)
-        yield float(self._core.unshot_share)
+        changed = _what_else_changed(self.scene, scene)
+        if changed:
+            raise InputError(
+                f"differs in its {changed}", file=scene.file, field="products", remedy="Solve the scene anew"
+            )
+        self.scene = scene
+        self._set_products()
+        self.condition = None
+
+    def _set_products(self) -> None:
+        for index, group in enumerate(panel_groups(self.scene)):
+            fenestration = _fenestration(self.scene, group.opening)
+            self._core.set_product(
+                len(self.scene.openings) + index,
+                np.ascontiguousarray(fenestration.transmission(), dtype=np.float32),
+                fenestration.room_reflectance(),
+            )
+
+    @contextmanager
+    def relighting(self) -> Iterator[Relighting]:
+        """A `with` block in which light is found on a thread of its own while this one draws.
+
+        with engine.relighting() as relighting:
+            relighting.begin(condition)
+            while not relighting.take():
+                show(engine.render(view))
+        """
+        self._core.start_worker()
+        try:
+            yield Relighting(self)
+        finally:
+            self._core.stop_worker()
 
     @contextmanager
     def _input_errors(self, condition: Condition) -> Iterator[None]:
@@ -163,7 +195,16 @@ class Engine:
             np.ascontiguousarray(sky_picture, dtype=np.float32),
         )
         if condition.sun_direction is not None:
-            core_condition.add_beam(_triple(condition.sun_direction), _triple(condition.sun_illuminance_rgb))
+            sun = _triple(condition.sun_direction)
+            core_condition.add_beam(sun, _triple(condition.sun_illuminance_rgb))
+            for light in panel_light(self.scene, condition):
+                opening = len(self.scene.openings) + light.group
+                for beam in light.beams:
+                    core_condition.add_lobe(
+                        opening, _triple(-beam.direction), _triple(beam.normal_illuminance_rgb), sun
+                    )
+                residual = np.ascontiguousarray(light.residual_rgb, dtype=np.float32)
+                core_condition.add_residual(opening, residual, sun)
         return core_condition
 
     def render(
@@ -225,6 +266,8 @@ class Engine:
             "clusters": facts.cluster_count,
             "link_bytes": facts.link_bytes,
             "kept": {"patch_rows": facts.kept_patch_rows, "node_rows": facts.kept_node_rows},
+            "panels": facts.panel_count,
+            "panel_bins": facts.panel_bin_count,
             "form_factor_defects": {
                 "raw_reciprocity": defects.raw_reciprocity,
                 "raw_row_sum": defects.raw_row_sum,
@@ -261,6 +304,41 @@ class Engine:
     def _require_light(self) -> None:
         if self.condition is None:
             raise RuntimeError("relight the engine before looking at it")
+
+
+class Relighting:
+    """Light that is being found beside other work. Made by `Engine.relighting`; used by the thread that draws."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self._begun: dict[int, Condition] = {}
+
+    def begin(self, condition: Condition) -> None:
+        """Asks for the light of a condition and returns at once; one that is still in work is abandoned.
+
+        Raises InputError for light that is negative or not finite; what is in work then goes on.
+        """
+        core_condition = self._engine._core_condition(condition)
+        with self._engine._input_errors(condition):
+            number = self._engine._core.submit(core_condition)
+        self._begun[number] = condition
+
+    def take(self) -> bool:
+        """Makes the newest state the engine's present light; whether it is the complete light of the newest condition.
+
+        The first state of a condition has its beams and sky, with the indirect light of the one before it.
+        """
+        return self._taken(*self._engine._core.take_latest())
+
+    def finish(self) -> None:
+        """Waits for the complete light of the newest condition, and makes it the engine's present light."""
+        self._taken(*self._engine._core.take_finished())
+
+    def _taken(self, number: int, is_complete: bool) -> bool:
+        if number in self._begun:
+            self._engine.condition = self._begun[number]
+            self._begun = {n: condition for n, condition in self._begun.items() if n >= number}
+        return is_complete and number == max(self._begun, default=0)
 
 
 def trace_primary(scene: Scene, view: View) -> tuple[NDArray[np.int32], Float32, NDArray[np.bool_]]:
@@ -306,19 +384,53 @@ def _triple(vector: Float64) -> tuple[float, float, float]:
 def _geometry(scene: Scene) -> _engine.SceneGeometry:
     mesh = scene.mesh
     normals = np.zeros((0, 3)) if mesh.corner_normals is None else mesh.corner_normals.reshape(-1, 3)
+    groups = panel_groups(scene)
+    face_material = np.array(mesh.face_material, dtype=np.int32)
+    for index, group in enumerate(groups):
+        face_material[group.faces] = len(scene.materials) + index
     geometry = _engine.SceneGeometry(
         np.ascontiguousarray(mesh.vertices, dtype=np.float64),
         np.ascontiguousarray(mesh.faces, dtype=np.int32),
-        np.ascontiguousarray(mesh.face_material, dtype=np.int32),
+        face_material,
         np.ascontiguousarray(normals, dtype=np.float32),
     )
     for material in scene.materials:
         geometry.add_material(material.reflectance, material.luminance, material.smooth, material.opening)
     for opening in scene.openings:
-        geometry.add_opening(transmittance_table(opening), diffuse_reflectance(opening))
+        geometry.add_opening(transmittance_table(opening), 0.0 if opening.product else diffuse_reflectance(opening))
+    for index, group in enumerate(groups):  # one orientation each, after the openings of the scene
+        geometry.add_material((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, len(scene.openings) + index)
+        basis = _fenestration(scene, group.opening).basis
+        geometry.add_panels(
+            np.ascontiguousarray(group.axes, dtype=np.float32),
+            np.radians(basis.edges_deg).astype(np.float32),
+            np.asarray(basis.counts, dtype=np.int32),
+        )
     for source in scene.point_sources:
         geometry.add_point_source(source.position, source.intensity)
     return geometry
+
+
+def _fenestration(scene: Scene, opening: int) -> Fenestration:
+    product = scene.openings[opening].product
+    assert product is not None
+    return load_fenestration(product)
+
+
+def _what_else_changed(old: Scene, new: Scene) -> str | None:
+    """What differs beside the parameters and names of products; None: nothing."""
+    if [o.product is None for o in old.openings] != [o.product is None for o in new.openings]:
+        return "openings that hold a product"
+    same = tuple(
+        dataclasses.replace(o, product=n.product, visible_transmittance=n.visible_transmittance) if o.product else o
+        for o, n in zip(old.openings, new.openings, strict=True)
+    )
+    if content_key(dataclasses.replace(old, openings=same)) != content_key(new):
+        return "geometry or materials"
+    for opening, (before, after) in enumerate(zip(old.openings, new.openings, strict=True)):
+        if before.product and _fenestration(old, opening).basis != _fenestration(new, opening).basis:
+            return f"bins of the product in {after.name}"
+    return None
 
 
 def _core_bins(bins: SkyBins) -> _engine.SkyBins:
@@ -333,6 +445,7 @@ def _core_options(options: SolveOptions, trace: bool) -> _engine.SolveOptions:
     core.elements_per_edge = options.elements_per_edge
     core.patch_samples = _engine.GatherSamples(options.patch_rays, options.patch_opening_rays)
     core.node_samples = _engine.GatherSamples(options.node_rays, options.node_opening_rays)
+    core.panel_rays = options.panel_rays
     core.node_spacing = options.node_spacing
     core.tolerance = options.tolerance
     core.seed = options.seed

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import calendar
 import io
+from collections.abc import Mapping
 
 from transom.configuration import DAY, READING_LX, Axis, Plot
 from transom.report.numbers import fixed, words
@@ -29,8 +30,8 @@ MOST_PRINTED = 12
 """Cells along an axis up to which each says its number."""
 
 
-def configuration_png(plot: Plot) -> bytes:
-    """One panel a target, on one scale, with the daylight autonomy in the title."""
+def configuration_png(plot: Plot, notes: Mapping[str, str] | None = None) -> bytes:
+    """One panel a target, on one scale, with the daylight autonomy in the title. notes: kept in the file."""
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.colors import BoundaryNorm, ListedColormap
@@ -63,7 +64,7 @@ def configuration_png(plot: Plot) -> bytes:
         bar.set_label(f"illuminance [lx]; green: {low} to {high} lx, to read by")
         figure.suptitle(f"{plot.scene}: {autonomy_words(plot)}", fontsize=10)
         stream = io.BytesIO()
-        figure.savefig(stream, format="png", dpi=150, metadata={"Software": None})
+        figure.savefig(stream, format="png", dpi=150, metadata={"Software": None, **(notes or {})})
     return stream.getvalue()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from transom.bundle import repository_store
 from transom.daylight.condition import Condition
 from transom.renderer import ImageResult, Progress, SensorResult
 from transom.run import reference_questions, render_case
-from transom.scene.model import Scene, View
+from transom.scene.model import Opening, Scene, View
 from transom.suite import load_suite
 from transom.timing import Timing
 from transom.visible import FirstSurfaces
@@ -33,6 +33,17 @@ layout = "hours"
 width = 6
 target_percent = 9.0
 cases = [{ scene = "small", sensors = false }]
+"""
+
+FENESTRATION = """
+[suites.fenestration]
+title = "Products"
+width = 8
+target_percent = 9.0
+cases = [
+    { scene = "small", glazing = ["window=clear:0.5"] },
+    { scene = "small", glazing = ["window=prismatic_panel(angle_low=30)"] },
+]
 """
 
 TOLERANCES = """
@@ -88,13 +99,17 @@ class FakeEngine:
         return SensorResult(np.full((len(points), 3), 100 * (1 + self.error)), np.zeros(len(points)))
 
 
-def make_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sky: str = "overcast") -> Path:
+def make_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sky: str = "overcast", more_suites: str = "") -> Path:
     """A project of one small scene, with fake renderers and timings."""
     small = small_scene()
-    scene = replace(small, conditions=tuple(replace(spec, sky=sky) for spec in small.conditions))
+    scene = replace(
+        small,
+        conditions=tuple(replace(spec, sky=sky) for spec in small.conditions),
+        openings=(Opening("window", "glass", "clear", 0.8),),
+    )
     scenes = tmp_path / "scenes"
     scenes.mkdir()
-    (scenes / "suites.toml").write_text(SUITES)
+    (scenes / "suites.toml").write_text(SUITES + more_suites)
     (scenes / "tolerances.toml").write_text(TOLERANCES)
     renderers = {"engine": FakeEngine(), "mitsuba": NoisyRenderer(relative_noise=0.02)}
 
@@ -114,6 +129,7 @@ def make_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sky: str = "ov
         monkeypatch.setattr(f"transom.{module}.load_renderer", renderers.__getitem__)
     for module in ("run", "visible", "report.viewer"):
         monkeypatch.setattr(f"transom.{module}.first_surfaces", surfaces)
+    monkeypatch.setattr("transom.report.build.make_plots", lambda *_: None)
     timings = [
         Timing("small", "solve", "s", 1.0, 0.9, 1.1, 3, 2, 40),
         Timing("small", "relight", "s", 2e-3, 1e-3, 3e-3, 9, 2, 40),
@@ -122,8 +138,8 @@ def make_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sky: str = "ov
     return tmp_path
 
 
-def render_references() -> None:
+def render_references(suites: Sequence[str] = ("rooms", "hours")) -> None:
     renderer = NoisyRenderer(relative_noise=0.02)
-    for name in ("rooms", "hours"):
+    for name in suites:
         for question in reference_questions(load_suite(name), renderer, {}):
             render_case(renderer, question, repository_store())

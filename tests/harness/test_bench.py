@@ -23,13 +23,23 @@ from transom.bench import (
     read_bench,
     write_bench,
 )
-from transom.bench_scenes import opening_face_count, with_other_glass, with_panes
+from transom.bench_scenes import (
+    beam_count,
+    has_changeable_product,
+    opening_face_count,
+    with_other_glass,
+    with_other_product,
+    with_panes,
+)
 from transom.cli import WRONG_USE, run_command
+from transom.daylight.condition import resolve_condition
 from transom.errors import InputError
+from transom.fenestration.light import panel_light
+from transom.fenestration.reglazing import load_glazed
 from transom.machine_limits import Limit, memory_copy, utilisations
 from transom.progress import CaseProgress
 from transom.provenance import current_provenance
-from transom.scene import load_scene
+from transom.scene import content_key, load_scene
 from transom.scene.model import Mesh, Scene
 
 
@@ -154,3 +164,14 @@ def test_published_schema_is_that_of_the_file() -> None:
 def test_of_needs_against(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command(["bench", "test_room", "--of", "HEAD"]) == WRONG_USE
     assert "--against" in capsys.readouterr().err
+
+
+def test_a_scene_with_a_product_counts_its_lobes_and_takes_others() -> None:
+    scene = load_glazed("test_room", ["south_upper=prismatic_panel"])
+    sun, overcast = (resolve_condition(spec, scene.site) for spec in (scene.conditions[0], scene.conditions[-1]))
+    assert beam_count(load_glazed("test_room"), sun) == 1
+    assert beam_count(scene, sun) == 1 + sum(len(light.beams) for light in panel_light(scene, sun)) > 1
+    assert beam_count(scene, overcast) == 0
+    others = [with_other_product(scene, index) for index in range(3)]
+    assert len({content_key(entry) for entry in [scene, *others]}) == 4
+    assert has_changeable_product(scene) and not has_changeable_product(load_glazed("test_room"))

@@ -38,8 +38,7 @@ def slab_transmittance(theta_deg: float, index: float) -> float:
 
 @pytest.mark.parametrize("name", list_products())
 def test_every_product_accounts_for_all_light(name: str) -> None:
-    product = load_product(name)
-    section = product.section()
+    section = load_product(name).tracer()
     for theta, phi in ((0, 0), (35, -70), (65, 160)):
         for sign in (1, -1):
             light = section.trace(incident(theta, phi) * [1, 1, sign], rays=64)

@@ -29,6 +29,7 @@ from transom.machine_limits import Utilisation
 from transom.provenance import current_provenance
 from transom.report.build import write_files
 from transom.report.content import Content, Pictures, make_content
+from transom.report.fenestration import Chapter, prism_figure
 from transom.report.notes import read_notes
 from transom.report.results import SCHEMAS, Results, collect_results
 from transom.report.speed import Speed
@@ -121,7 +122,8 @@ def checked() -> Checked:
 def content() -> Content:
     made = comparison()
     results = collect_results([(made, judge(made.subjects(), made.missing, TOLERANCES))], [])
-    pictures = Pictures(rooms=[], hours=[], factoring=[], day=None, figure_13=[], corners=[])
+    chapter = Chapter([], [], prism_figure(), [])
+    pictures = Pictures(rooms=[], hours=[], factoring=[], day=None, figure_13=[], corners=[], fenestration=chapter)
     return make_content(results, [], pictures, speed(), TOLERANCES, read_notes(), [checked()])
 
 

@@ -13,6 +13,7 @@ from report_project import make_project, render_references
 from transom import visible
 from transom.colour import luminance
 from transom.figures import DIFFERENCE_SCALE, palette
+from transom.products import load_product
 from transom.report.build import write_report
 from transom.report.pictures import difference_and_noise, find_pictures
 from transom.report.viewer import log_codes, log_values
@@ -220,3 +221,64 @@ def test_text_has_the_contrast_that_wcag_asks_for(browser: Browser) -> None:
 def test_page_fits_a_narrow_window(browser: Browser) -> None:
     browser.resize(420, 900)
     assert browser.run("document.documentElement.scrollWidth") <= 420
+
+
+PRISM = "document.querySelector('.prism')"
+
+
+def set_prism(browser: Browser, **values: float) -> list[tuple[float, float]]:
+    """Moves the sliders of the prism figure; the exits that it found, (degrees upwards, share)."""
+    for name, value in values.items():
+        place = f"{PRISM}.querySelector('input[name={name}]')"
+        browser.run(f"{place}.value = {value}; {place}.dispatchEvent(new Event('input'))")
+    exits = browser.run(f"JSON.parse({PRISM}.dataset.exits)")
+    return [(exit_["angle"], exit_["share"]) for exit_ in exits]
+
+
+@needs_chromium
+@pytest.mark.parametrize(
+    ("profile", "low", "high"), [(40, 42, 5), (48, 42, 70), (25, 30, 60), (10, 42, 5), (50, 60, 60), (60, 10, 80)]
+)
+def test_prism_figure_sends_light_where_the_tracer_does(browser: Browser, profile: int, low: int, high: int) -> None:
+    found = set_prism(browser, profile=profile, angle_low=low, angle_high=high)
+    product = load_product("prismatic_panel").with_parameters({"angle_low": low, "angle_high": high})
+    sun = np.radians(profile)
+    traced = product.section().trace([0.0, -np.sin(sun), np.cos(sun)], 4096)
+    angles = np.degrees(np.arctan2(traced.transmitted.directions[:, 1], traced.transmitted.directions[:, 2]))
+    for angle, share in [entry for entry in found if entry[1] > 0.01]:
+        near = np.abs(angles - angle) < 0.1
+        assert traced.transmitted.flux[near].sum() == pytest.approx(share, abs=0.003), angle
+    assert sum(share for _, share in found) == pytest.approx(traced.transmitted.total, abs=0.003)
+    reflected = float(browser.run(f"{PRISM}.dataset.reflected"))
+    assert reflected == pytest.approx(traced.reflected.total, abs=0.003)
+
+
+@needs_chromium
+def test_prism_figure_prints_what_it_found(browser: Browser) -> None:
+    (angle, share), *_ = set_prism(browser, profile=40, angle_low=42, angle_high=5)
+    first = browser.run(f"[...{PRISM}.querySelectorAll('tbody tr:first-child td')].map(cell => cell.textContent)")
+    assert first == [f"{abs(angle):.1f}° down", f"{100 * share:.1f} %"]
+    assert browser.run(f"{PRISM}.querySelectorAll('svg line').length") > 20
+
+
+@needs_chromium
+def test_prism_figure_works_by_keyboard_and_can_be_reset(browser: Browser) -> None:
+    slider = f"{PRISM}.querySelector('input[name=angle_high]')"
+    browser.run(f"{slider}.focus()")
+    before = browser.run(f"{PRISM}.dataset.exits")
+    browser.press("ArrowRight")
+    assert browser.run(f"{slider}.value") == "6"
+    assert browser.run(f"{slider}.getAttribute('aria-valuetext')") == "6 degrees"
+    assert browser.run(f"{PRISM}.dataset.exits") != before
+    browser.run(f"{PRISM}.querySelector('button').focus()")
+    browser.press("Enter")
+    assert browser.run(f"{slider}.value") == "5"
+    assert browser.run(f"{PRISM}.dataset.exits") == before
+
+
+@needs_chromium
+def test_prism_figure_takes_the_sun_of_a_condition(browser: Browser) -> None:
+    choice = f"{PRISM}.querySelector('select')"
+    browser.run(f"{choice}.selectedIndex = 1; {choice}.dispatchEvent(new Event('change'))")
+    profile = float(browser.run(f"{choice}.value"))
+    assert float(browser.run(f"{PRISM}.querySelector('input[name=profile]').value")) == pytest.approx(profile, abs=0.5)

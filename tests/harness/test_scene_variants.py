@@ -72,13 +72,13 @@ def test_the_same_product_by_other_words_answers_the_same_question() -> None:
 
 def test_variants_of_a_suite_have_names_of_their_own(suite: Suite) -> None:
     names = [case.scene.name for case in suite.cases]
-    assert len(set(names)) == len(names) == 14
+    assert len(set(names)) == len(names) == 16
     assert {case.scene.variant_of for case in suite.cases} == {"test_room", "partition_office"}
     assert {case.condition.name for case in suite.cases} == {"mar21_1000", "mar21_1530"}
 
 
 def test_scenes_are_chosen_with_their_variants_by_name_or_by_pattern(suite: Suite) -> None:
-    assert len(chosen(suite, {"test_room"}).cases) == 8
+    assert len(chosen(suite, {"test_room"}).cases) == 10
     assert len(chosen(suite, {"*laser_cut_panel"}).cases) == 2
     assert len(chosen(suite, {"test_room-south_upper-lumitop_like"}).cases) == 1
     with pytest.raises(InputError, match="no scene of suite"):

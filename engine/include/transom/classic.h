@@ -8,6 +8,7 @@
 
 #include "transom/geometry.h"
 #include "transom/light_mesh.h"
+#include "transom/panels.h"
 #include "transom/ray_scene.h"
 #include "transom/sky.h"
 #include "transom/transfer.h"
@@ -20,6 +21,7 @@ struct ForwardRayCounts {
   int sky_directions = 5000;     ///< over the sky
   int ground_directions = 1000;  ///< below the horizon (the published method has no ground)
   int opening_points = 50;       ///< on all openings together; every direction passes every point
+  int panel_bin_rays = 64;       ///< of each panel into each exit bin
 };
 
 /// Illuminance of patches by forward rays [lx], what came as parallel sunlight apart from what came from sky and
@@ -33,24 +35,28 @@ struct ForwardLight {
 class ForwardRays {
  public:
   ForwardRays(const LightMesh& mesh, const RayScene& rays, const std::vector<Material>& materials,
-              const std::vector<OpeningGroup>& openings, ForwardRayCounts counts, std::uint32_t seed);
+              const std::vector<OpeningGroup>& openings, const Panels& panels, ForwardRayCounts counts,
+              std::uint32_t seed);
 
-  /// patch_of_slot: -1 where a slot takes no part. patch_area: exposed area [m²].
-  ForwardLight cast(const Condition& condition, const SkyBinIndex& sky, const std::vector<int>& patch_of_slot,
-                    const std::vector<float>& patch_area) const;
+  /// panel_radiance: of panels into their exit bins [cd/m²]. patch_of_slot: -1 where a slot takes no part. patch_area:
+  /// exposed area [m²].
+  ForwardLight cast(const Condition& condition, const std::vector<glm::vec3>& panel_radiance, const SkyBinIndex& sky,
+                    const std::vector<int>& patch_of_slot, const std::vector<float>& patch_area) const;
 
  private:
   struct OpeningTriangle {
     glm::vec3 corner[3], normal;  // the normal looks outdoors
     float area;
-    int opening;
+    int face, opening;
   };
-  /// Light that passes a point of an opening on its way in. direction: towards where it comes from.
+  /// Light that passes a point of an opening on its way in. outwards: towards where it comes from; 0 if it is known to
+  /// arrive. inwards: where it goes.
   struct Arrival {
-    glm::vec3 point, direction, flux;
+    glm::vec3 point, outwards, inwards, flux;
   };
   std::vector<Arrival> sun_arrivals(const Beam& beam) const;
   std::vector<Arrival> sky_arrivals(const Condition& condition, const SkyBinIndex& sky) const;
+  std::vector<Arrival> panel_arrivals(const std::vector<glm::vec3>& panel_radiance) const;
   void deposit(const std::vector<Arrival>& arrivals, const std::vector<int>& patch_of_slot,
                std::vector<glm::vec3>& flux) const;
 
@@ -58,6 +64,7 @@ class ForwardRays {
   const RayScene& rays_;
   const std::vector<Material>& materials_;
   const std::vector<OpeningGroup>& openings_;
+  const Panels& panels_;
   ForwardRayCounts counts_;
   std::uint32_t seed_;
   std::vector<OpeningTriangle> triangles_;
@@ -77,6 +84,8 @@ class ProgressiveRadiosity {
   /// form_factors, through: what each patch sees of the others, directly and through openings.
   ProgressiveRadiosity(const SparseRows& form_factors, const SparseRows& through, std::vector<float> area,
                        std::vector<glm::vec3> reflectance, std::vector<glm::vec3> emitted);
+
+  void set_reflectance(std::size_t patch, glm::vec3 reflectance) { reflectance_[patch] = reflectance; }
 
   /// Darkness in which nothing has been emitted yet.
   ShootingState dark() const;

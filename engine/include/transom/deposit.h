@@ -1,6 +1,7 @@
 /// @file Direct light of beams and point sources on the elements of patches, by area.
 #pragma once
 
+#include <array>
 #include <glm/glm.hpp>
 #include <map>
 #include <span>
@@ -22,21 +23,32 @@ struct LitElement {
 ///
 /// Elements look for the sun through openings. An opening that is smaller than an element would be missed by most of
 /// their samples: its light is sent from the opening instead. Light belongs to the first opening that a point sees on
-/// its way to the sun, so that none is counted twice.
+/// its way to the sun, so that none is counted twice. Lobes come in shafts, whose part of an element is found exactly.
 class DirectLight {
  public:
   /// small_opening_m2: area of an element; opening faces below it send their light themselves.
   DirectLight(const LightMesh& mesh, const RayScene& rays, const std::vector<PointSource>& sources,
               const std::vector<Material>& materials, float small_opening_m2);
 
-  /// Mean direct illuminance of the elements of `slots` that receive any, in the order of `slots`. Stratified over each
-  /// element; a patch that is partly lit is sampled again eight times as densely.
-  std::vector<LitElement> deposit(const std::vector<Beam>& beams, const std::vector<int>& slots,
-                                  std::uint32_t seed) const;
+  /// Patches that receive light, and what of them every beam needs.
+  struct Receivers {
+    std::vector<int> slots;
+    std::vector<char> is_behind_openings;  ///< beams reach it through openings alone
+    std::vector<std::array<glm::vec3, 4>>
+        corners;                     ///< lifted, at (0, 0), (1, 0), (1, 1), (0, 1); triangles: (0, 1) twice
+    std::vector<glm::vec3> normals;  ///< of the lit side
+  };
+  /// is_behind_openings: empty where none is known to be.
+  Receivers receivers(const std::vector<int>& slots, std::vector<char> is_behind_openings) const;
 
-  /// Share of a beam that arrives at lifted points: 0 where something opaque intervenes, else the transmittance.
-  void beam_transmission(glm::vec3 direction_to_source, std::span<const glm::vec3> points,
-                         std::span<float> share) const;
+  /// Mean direct illuminance of the elements of the receivers that receive any, in their order. Stratified over each
+  /// element; of a patch that is partly lit, elements at the edge of light are sampled eight times as densely. Patches
+  /// behind openings cost rays only where the outline of an opening falls on them.
+  std::vector<LitElement> deposit(const std::vector<Beam>& beams, const Receivers& receivers, std::uint32_t seed) const;
+
+  /// Share of a beam that arrives at lifted points: 0 where something opaque intervenes, else the transmittance. Of a
+  /// lobe: what the openings before its panel leave, where the panel is the first opening that the point sees.
+  void beam_transmission(const Beam& beam, std::span<const glm::vec3> points, std::span<float> share) const;
 
   /// Direct illuminance at a lifted point with a shading normal [lx].
   glm::vec3 illuminance(const std::vector<Beam>& beams, glm::vec3 point, glm::vec3 normal) const;
@@ -48,10 +60,23 @@ class DirectLight {
   struct LocalSource {
     glm::vec3 position, intensity;
   };
-  std::vector<glm::vec3> points_on(int slot, std::span<const int> elements, int samples, std::uint32_t seed) const;
-  void beam_on_slot(glm::vec3 direction, int slot, std::uint32_t seed, std::vector<float>& mean) const;
-  void deposit_on_slot(const std::vector<Beam>& beams, int slot, std::uint32_t seed,
-                       std::vector<LitElement>& lit) const;
+  class Patterns;
+  using Corners = std::array<glm::vec3, 4>;
+  std::vector<glm::vec3> points_on(int slot, const Corners& corners, std::span<const int> elements, int samples,
+                                   const Patterns& patterns) const;
+  std::vector<std::size_t> reached(glm::vec3 direction, const Receivers& receivers) const;
+  std::vector<float> sample_sun(const Beam& sun, const Receivers& receivers, const std::vector<std::size_t>& candidates,
+                                const Patterns& patterns) const;
+  std::vector<int> partly_lit(int slot, const std::vector<int>& place_of_slot, const std::vector<float>& share) const;
+  void add_sun(const Beam& sun, const Receivers& receivers, const Patterns& patterns,
+               std::vector<std::vector<glm::vec3>>& sum) const;
+  std::vector<std::size_t> reached_by_lobe(const Beam& lobe, const Receivers& receivers) const;
+  void lobe_on_slot(const Beam& lobe, int slot, std::uint32_t seed, std::vector<float>& mean) const;
+  void add_lobe(const Beam& lobe, const Receivers& receivers, std::uint32_t seed,
+                std::vector<std::vector<glm::vec3>>& sum) const;
+  void shaft_transmission(const Beam& lobe, std::span<const glm::vec3> points, std::span<float> share) const;
+  void sources_on_slot(int slot, const Corners& corners, glm::vec3 normal, const Patterns& patterns,
+                       std::vector<glm::vec3>& sum) const;
 
   void ignore_small_openings(glm::vec3 direction, std::span<const glm::vec3> points, std::span<float> share) const;
   std::map<int, glm::vec3> send_through_small_openings(const std::vector<Beam>& beams, std::uint32_t seed) const;
@@ -59,8 +84,8 @@ class DirectLight {
   const LightMesh& mesh_;
   const RayScene& rays_;
   std::vector<LocalSource> sources_;
-  std::vector<int> small_openings_;     // faces
-  std::vector<char> is_small_opening_;  // by face
+  std::vector<int> large_openings_, small_openings_;  // faces
+  std::vector<char> is_small_opening_;                // by face
 };
 
 }  // namespace transom

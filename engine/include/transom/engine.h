@@ -3,6 +3,7 @@
 
 #include <glm/glm.hpp>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "transom/light_mesh.h"
 #include "transom/lighting.h"
 #include "transom/node_field.h"
+#include "transom/panels.h"
 #include "transom/point_links.h"
 #include "transom/ray_scene.h"
 #include "transom/sky.h"
@@ -35,6 +37,7 @@ struct SolveOptions {
   int elements_per_edge = 4;      ///< a patch has the square of it
   GatherSamples patch_samples{512, 128};
   GatherSamples node_samples{1024, 256};
+  int panel_rays = 256;     ///< outwards from a panel, for each incident bin
   float node_spacing = 6;   ///< of nodes, against the harmonic mean distance of what a cell sees
   double tolerance = 1e-4;  ///< flux in flight at which interreflection stops, relative
   std::uint32_t seed = 1;
@@ -47,8 +50,9 @@ struct SolveFacts {
   float maximum_edge_m = 0;
   double leak_share = 0;  ///< of the hemisphere rays of interior patches, those that met nothing
   TransferDefects defects;
-  int cluster_count = 0;       ///< of patches, for interreflection
-  std::size_t link_bytes = 0;  ///< of what is kept of how nodes see patches
+  int cluster_count = 0;  ///< of patches, for interreflection
+  int panel_count = 0, panel_bin_count = 0;
+  std::size_t link_bytes = 0;                   ///< of what is kept of how nodes see patches
   int kept_patch_rows = 0, kept_node_rows = 0;  ///< taken over from another engine, but for what lies behind openings
 };
 
@@ -77,16 +81,21 @@ class Engine {
   Engine(const Engine& solved, SceneGeometry scene);
   ~Engine();
 
-  /// The light of a condition: everything but the image. Any number of threads may ask at once.
-  /// previous: kClassic alone replaces its light step by step, so that the answer depends on it within the tolerance of
-  /// shooting; null: from darkness.
-  std::shared_ptr<const Lighting> relight(Condition condition, const Lighting* previous = nullptr) const;
+  /// The light of a condition: everything but the image. Any number of threads may ask at once. Throws InputError for
+  /// light that is negative or not finite.
+  /// previous: light whose indirect part the first states show; kClassic starts from it and replaces it step by step,
+  /// so that its answer depends on it within the tolerance of shooting. Null: from darkness. follower: takes the states
+  /// on the way; null: none. The answer is null where it has abandoned the relighting.
+  std::shared_ptr<const Lighting> relight(Condition condition, const Lighting* previous = nullptr,
+                                          RelightFollower* follower = nullptr) const;
 
-  /// kClassic: relights step by step. The direct light is that of the new condition at once; `continue_relight` shoots
-  /// at most `shots` times, replaces the old condition's indirect light by as much, and says whether more is to come.
-  /// Throws InputError for another method.
-  Lighting begin_relight(Condition condition, const Lighting* previous) const;
-  bool continue_relight(Lighting& lighting, int shots) const;
+  /// Throws InputError for a condition that `relight` would refuse.
+  void check(const Condition& condition) const { condition.validate(sky_index_->count() - 1); }
+
+  /// Puts a product into the panels of an opening group; until then nothing passes them. No light that was found before
+  /// changes. Throws InputError for a group without panels, a matrix of the wrong size or values that cannot be. Not
+  /// while others relight.
+  void set_product(int opening, Product product);
 
   /// What points (world coordinates [m]) with normals see: found once, asked under any light.
   Sensors sensors(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
@@ -108,6 +117,7 @@ class Engine {
   const LightMesh& mesh() const { return *mesh_; }
   const SkyBinIndex& sky_index() const { return *sky_index_; }
   const DirectLight& direct_light() const { return *direct_light_; }
+  const Panels& panels() const { return *panels_; }
   glm::vec3 reflectance(int face, Side side) const;
 
   /// What speaks for the light at a point of a face: nodes around it, or else its patch. Numbers are those of
@@ -158,16 +168,31 @@ class Engine {
   void look_out_of_nodes(const Known& known);
   void link_nodes(const Known& known);
   std::uint32_t node_seed(const Node& node) const;
+  void gather_panels();
+  void link_panels();
+  void balance_panels();
   void solve_classic();
+  std::shared_ptr<const Lighting> relight_classic(Condition condition, const Lighting* previous,
+                                                  RelightFollower* follower) const;
+  Lighting direct_classic(Condition condition, const Lighting* previous) const;
   void show_classic(Lighting& lighting) const;
   std::vector<Share> to_slots(std::vector<Share> elements) const;
   std::vector<Share> patches_at(const std::vector<Share>& slots) const;
+  Lighting direct_light_of(Condition condition) const;
+  std::shared_ptr<const Lighting> with_indirect_of(Lighting lighting, const Lighting* previous) const;
+  void find_smooth_radiosity(Lighting& lighting) const;
+  void gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& first_reflection) const;
   std::vector<Share> to_patches(const std::vector<Share>& elements) const;
-  glm::vec3 sky_light(const Condition& condition, const SparseRows& rows, std::size_t row) const;
+  glm::vec3 sky_light(const Lighting& lighting, const SparseRows& rows, std::size_t row) const;
+  void find_shafts(Condition& condition, std::vector<glm::vec3>& residual) const;
+  double find_panel_radiance(const std::vector<glm::vec3>& radiosity, Lighting& lighting) const;
+  void find_sky_light(Lighting& lighting) const;
+  bool solve_with_panels(Lighting& lighting, const Interreflection::AfterCycle& after_cycle) const;
   void light_always();
   std::vector<int> beam_slots() const;
-  std::vector<BrightElement> bright_elements(const std::vector<LitElement>& lit) const;
+  std::vector<BrightElement> bright_elements(std::span<const LitElement> lit) const;
   std::vector<glm::vec3> element_direct(const Lighting& lighting) const;
+  glm::dvec3 through_product(const Panel& panel, const std::vector<glm::dvec3>& arriving) const;
 
   SceneGeometry scene_;
   SkyBins sky_bins_;
@@ -179,6 +204,7 @@ class Engine {
   std::vector<float> edges_;  // longest of patches, by face [m]
   std::unique_ptr<LightMesh> mesh_;
   std::unique_ptr<SkyBinIndex> sky_index_;
+  std::unique_ptr<Panels> panels_;
   std::unique_ptr<Gatherer> gatherer_;
   std::unique_ptr<DirectLight> direct_light_, beam_light_;  // with point sources and without
 
@@ -186,14 +212,21 @@ class Engine {
   std::vector<int> patch_of_slot_;  // -1: takes no part
   std::vector<int> slot_of_patch_;
   std::vector<PatchRow> patch_rows_;
-  std::vector<float> patch_area_;  // exposed part [m²]
+  std::vector<float> patch_area_;     // exposed part [m²]
+  std::vector<float> element_share_;  // of that area: patch * elements_per_slot + element
   std::vector<glm::vec3> patch_reflectance_, patch_emitted_;
   std::vector<char> is_interior_;
-  std::vector<int> unseen_slots_;   // that see patches indoors and were seen by none
-  bool connects_emitters_ = false;  // small emitters: found by connection, not by rays
+  DirectLight::Receivers receivers_;  // all patches
+  std::vector<int> unseen_slots_;     // that see patches indoors and were seen by none
+  bool connects_emitters_ = false;    // small emitters: found by connection, not by rays
   std::shared_ptr<const SparseRows> form_factors_;
   SparseRows through_, patch_sky_;
   std::unique_ptr<Interreflection> interreflection_;
+
+  // Panels: products by opening; what arrives at each incident bin from the sky, and from elements or patches outdoors.
+  std::vector<Product> products_;
+  std::vector<GatherRow> panel_rows_;  // during solve
+  SparseRows panel_sky_, panel_patches_;
 
   // Where light is shown.
   std::unique_ptr<NodeField> nodes_;

@@ -11,6 +11,8 @@
 
 namespace transom {
 
+class Panels;
+
 /// Numbers of samples for one receiver.
 struct GatherSamples {
   int hemisphere = 1024;  ///< rays over the hemisphere
@@ -29,7 +31,8 @@ struct Share {
 struct GatherRow {
   std::vector<Share> reached;   ///< elements seen without looking through an opening: form factors
   std::vector<Share> through;   ///< elements seen through openings: form factors x transmittance
-  std::vector<Share> sky;       ///< sky bins (and ground): illuminance per luminance [lx per cd/m²]
+  /// Sky bins, then the ground, then exit bins of panels (Panels): illuminance per luminance [lx per cd/m²].
+  std::vector<Share> sky;
   float escaped = 0;            ///< share of the hemisphere that meets nothing: open sky
   float exposure = 1;           ///< share of the receiver that does not lie inside a solid
   float harmonic_distance = 0;  ///< harmonic mean distance of what is seen [m]
@@ -40,11 +43,12 @@ struct GatherRow {
 /// Hemisphere: cosine-distributed rays to the first surface, opening or not. An opening's own reflection is thus part
 /// of `reached`. What is seen through the openings is sampled on the openings: solid-angle sampling of their triangles
 /// [Arvo 1995], each ray continued outdoors to an obstruction, the sky or the ground, times the transmittance of all
-/// openings on its way. A ray that meets another opening first is left to that opening.
+/// openings on its way. A ray that meets another opening first is left to that opening. A ray ends at the room side of a
+/// panel: what it sees there is the panel's exit bin, a light source like a bin of the sky.
 class Gatherer {
  public:
   Gatherer(const LightMesh& mesh, const RayScene& rays, const std::vector<Material>& materials,
-           const std::vector<OpeningGroup>& openings, const SkyBinIndex& sky);
+           const std::vector<OpeningGroup>& openings, const SkyBinIndex& sky, const Panels& panels);
 
   /// What is seen without looking through an opening: `reached`, `escaped`, `exposure`, `harmonic_distance`, and the
   /// sky seen by itself. No glazing changes it.
@@ -80,6 +84,7 @@ class Gatherer {
   const std::vector<Material>& materials_;
   const std::vector<OpeningGroup>& openings_;
   const SkyBinIndex& sky_;
+  const Panels& panels_;
   std::vector<OpeningTriangle> opening_triangles_;
 };
 

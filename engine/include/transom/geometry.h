@@ -3,8 +3,10 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <vector>
 
+#include "transom/angle_bins.h"
 #include "transom/grid.h"
 
 namespace transom {
@@ -17,10 +19,12 @@ struct Material {
   int opening = -1;          ///< opening group, or -1 for an opaque surface
 };
 
-/// Faces that daylight passes, with one angular transmittance. Their fronts look outdoors.
+/// Faces that daylight passes, with one angular transmittance. Their fronts look outdoors. With a `panel` they hold a
+/// glazing product: all of one orientation, and nothing passes them straight (transmittance 0).
 struct OpeningGroup {
   std::vector<float> transmittance;  ///< at cos(theta) = i / (size - 1); linear in between; the same both ways
   float diffuse_reflectance = 0;     ///< of the room side, hemispherical
+  std::optional<PanelFrame> panel = std::nullopt;
 
   float transmittance_at(float cos_theta) const;
 };

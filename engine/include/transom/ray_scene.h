@@ -50,7 +50,7 @@ class RayScene {
 
   /// Product of the transmittances of all openings between t_near and t_far of each ray. Opaque surfaces are not looked
   /// at.
-  void transmittance(std::span<const Ray> rays, std::span<float> shares) const;
+  void transmittance(std::span<const Ray> rays, std::span<float> shares, Order order = Order::kScattered) const;
   float transmittance(const Ray& ray) const;
 
   bool has_openings() const { return has_openings_; }

@@ -2,7 +2,10 @@
 #pragma once
 
 #include <glm/glm.hpp>
+#include <memory>
 #include <vector>
+
+#include "transom/light_shaft.h"
 
 namespace transom {
 
@@ -31,15 +34,29 @@ class SkyBinIndex {
   int count_ = 0;
 };
 
-/// Parallel light: unit direction towards its source, and normal illuminance outdoors as linear RGB [lx].
+/// Parallel light: unit direction towards its source, and normal illuminance as linear RGB [lx]. Either the sun itself,
+/// outdoors and through clear openings; or a lobe of it behind the panels of an opening group, with the illuminance that
+/// a panel in full sun gives it.
 struct Beam {
   glm::vec3 direction_to_source{0, 0, 1};
   glm::vec3 normal_illuminance{0};
+  int opening = -1;                    ///< whose panels send the lobe; -1: the sun itself
+  glm::vec3 direction_to_sun{0, 0, 1};  ///< of a lobe: unit, outdoors
+  /// Of a lobe: where it is, as Engine::relight has found.
+  std::shared_ptr<const std::vector<LightShaft>> shafts = nullptr;
+};
+
+/// The rest of the sun behind the panels of an opening group: radiance of a panel in full sun by exit bin [cd/m²].
+struct Residual {
+  int opening = -1;
+  glm::vec3 direction_to_sun{0, 0, 1};
+  std::vector<glm::vec3> radiance;
 };
 
 /// Everything outdoors that can change from hour to hour.
 struct Condition {
   std::vector<Beam> beams;
+  std::vector<Residual> residuals;
   std::vector<float> sky_luminance;  ///< one a sky bin [cd/m²]
   glm::vec3 sky_colour{1};           ///< RGB with Y = 1
   glm::vec3 ground_luminance{0};     ///< [cd/m²]

@@ -48,6 +48,14 @@ struct ViewSamples {
     glm::vec3 direction;
   };
   std::vector<Outlook> outlooks;
+
+  /// Exit bins of panels in which their light is seen.
+  struct SeenPanel {
+    int pixel;
+    float weight;
+    int bin;
+  };
+  std::vector<SeenPanel> panels;
   int edge_pixel_count = 0;
 };
 

@@ -41,6 +41,8 @@ def check_bsdf(product: Bsdf) -> list[Finding]:
         sums = {path: KLEMS_FULL.projected_solid_angles @ values for path, values in tables.items()}
         for path, by_incidence in sums.items():
             worst = float(by_incidence.max())
+            x, y, z = KLEMS_FULL.centres[int(by_incidence.argmax())]
+            where = f"theta {np.degrees(np.arccos(z)):.3g}, phi {np.degrees(np.arctan2(y, x)) % 360:.3g}"
             findings.append(
                 Finding(
                     "energy",
@@ -49,7 +51,7 @@ def check_bsdf(product: Bsdf) -> list[Finding]:
                     worst,
                     1 + ENERGY_SLACK,
                     worst <= 1 + ENERGY_SLACK,
-                    f"leaves at most {worst:.4f} of the light of an incidence",
+                    f"leaves at most {worst:.4f} of the light of an incidence ({where})",
                 )
             )
         for sent, back in (

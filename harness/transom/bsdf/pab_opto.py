@@ -172,8 +172,8 @@ def _split(file: FilePath) -> tuple[list[str], Float64]:
 
 def _incident_angles(header: str, file: FilePath) -> tuple[float, float]:
     both = re.search(r"^incident_angle\s+(\S+)\s+(\S+)", header, re.MULTILINE)
-    theta = float(both[1]) if both else _number(header, "intheta", file)
-    phi = float(both[2]) if both else _number(header, "inphi", file)
+    theta = _finite(both[1], "incident_angle", file) if both else _number(header, "intheta", file)
+    phi = _finite(both[2], "incident_angle", file) if both else _number(header, "inphi", file)
     if theta is None or phi is None:
         remedy = "The header has #intheta and #inphi, or #incident_angle THETA PHI, in degrees"
         raise InputError("is missing", file=file, field="incident angle", remedy=remedy)
@@ -184,12 +184,17 @@ def _incident_angles(header: str, file: FilePath) -> tuple[float, float]:
 
 def _number(header: str, name: str, file: FilePath) -> float | None:
     found = re.search(rf"^{name}\s+(\S+)", header, re.MULTILINE)
-    if found is None:
-        return None
+    return None if found is None else _finite(found[1], name, file)
+
+
+def _finite(text: str, name: str, file: FilePath) -> float:
     try:
-        return float(found[1])
+        value = float(text)
     except ValueError:
-        raise InputError("is not a number", file=file, field=f"#{name}", value=found[1]) from None
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError("is not a number", file=file, field=f"#{name}", value=text)
+    return value
 
 
 def _direction(theta_deg: Float64, phi_deg: Float64) -> Float64:

@@ -158,6 +158,8 @@ def parse_tree(text: str, rank: int) -> TensorTree:
 
     def node(low: Float64, level: int) -> None:
         nonlocal position
+        if level > LARGEST_LEVEL:
+            raise TreeError(f"is more than {LARGEST_LEVEL} levels deep")
         if position >= len(tokens) or tokens[position] != "{":
             raise TreeError("an opening brace is missing")
         position += 1

@@ -115,7 +115,7 @@ def _data_block(spectrum: Spectrum, path: Path, values: NDArray[np.float64]) -> 
 def _parsed(file: FilePath) -> Element:
     try:
         root = ET.parse(file).getroot()
-    except ET.ParseError as error:
+    except (ET.ParseError, LookupError, ValueError) as error:  # the last two: an encoding that does not exist
         raise InputError(f"is not XML ({error})", file=file) from None
     for element in root.iter():  # names without their namespace
         if isinstance(element.tag, str):
@@ -183,9 +183,13 @@ def _check_basis(layer: Element, file: FilePath) -> None:
         blocks = basis.findall("AngleBasisBlock")
         if not blocks:
             continue
+        bounds = [block.find("ThetaBounds") for block in blocks]
+        if None in bounds:
+            remedy = "Each block has ThetaBounds with LowerTheta and UpperTheta"
+            field = f"AngleBasisBlock[{bounds.index(None)}]"
+            raise InputError("has no ThetaBounds", file=file, field=field, remedy=remedy)
         try:
             counts = tuple(int(_text(block, "nPhis")) for block in blocks)
-            bounds = [block.find("ThetaBounds") for block in blocks]
             edges = (float(_text(bounds[0], "LowerTheta")), *(float(_text(bound, "UpperTheta")) for bound in bounds))
         except ValueError as error:
             raise InputError(f"is not a number ({error})", file=file, field="AngleBasisBlock") from None

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from transom.products.lobe_plot import SunDirection
 
 SUN_RAYS = 1024
-"""At least so many for one sun: it is one direction, not hundreds."""
+GRID_RAYS = 256
 
 DEFAULT_SUNS = ("10,0", "25,0", "40,0", "60,0", "10,45", "25,45", "40,45", "60,45")
 
@@ -81,8 +81,14 @@ def measure(
         typer.Option(metavar="STEP", help="Every exit of a grid of incident directions, STEP degrees apart."),
     ] = None,
     rays: Annotated[
-        int, typer.Option(help="Rays for each direction, where curves or diffuse parts need them.", min=16, max=65536)
-    ] = 256,
+        int | None,
+        typer.Option(
+            help="Rays of each direction, where curves or diffuse parts need them: 1024 of a sun, 256 of a grid, 32 or "
+            "(diffuse) 1024 in tables.",
+            min=16,
+            max=65536,
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Of the random numbers.", min=0)] = 1,
 ) -> None:
     """Measure a product by tracing light through it: a goniophotometer that needs no laboratory.
@@ -117,9 +123,9 @@ def measure(
     typer.echo(f"{chosen.title} ({chosen.record.status})")
     typer.echo("  " + " ".join(chosen.record.uncertainty.split()))
     if sun or plot is not None:
-        _show_suns(chosen, [_sun(text) for text in sun or DEFAULT_SUNS], plot, max(rays, SUN_RAYS), seed)
+        _show_suns(chosen, [_sun(text) for text in sun or DEFAULT_SUNS], plot, rays or SUN_RAYS, seed)
     if directions is not None and output is not None:
-        _by_direction(chosen, directions, output, rays, seed)
+        _by_direction(chosen, directions, output, rays or GRID_RAYS, seed)
     elif output is not None or not (sun or plot):
         _tables(chosen, output, rays, seed)
 
@@ -156,7 +162,7 @@ def _by_direction(chosen: Product, step_deg: float, output: Path, rays: int, see
     typer.echo(f"{output}: {len(found.incident)} incident directions, {len(found.flux)} exits")
 
 
-def _tables(chosen: Product, output: Path | None, rays: int, seed: int) -> None:
+def _tables(chosen: Product, output: Path | None, rays: int | None, seed: int) -> None:
     from transom.bsdf.checks import check_bsdf
     from transom.bsdf.window_xml import write_klems_xml
     from transom.products.goniophotometer import measure as measured

@@ -77,7 +77,8 @@ def landing(directions: Float64) -> Float64:
 def bin_landing(basis: AngleBasis) -> Float64:
     """The same for light spread evenly over each bin (B, 4)."""
     within = directions_within(basis, BIN_SAMPLES)
-    return landing(within.reshape(-1, 3)).reshape(basis.count, BIN_SAMPLES, len(TARGETS)).mean(axis=1)
+    shares = landing(within.reshape(-1, 3)).reshape(basis.count, BIN_SAMPLES, len(TARGETS))
+    return np.asarray(shares.mean(axis=1))
 
 
 def landed(directions: Float64, flux: Float64) -> Float64:

@@ -23,8 +23,18 @@ Bool = NDArray[np.bool_]
 DIVIDES_ABOVE = 0.05
 """Weight from which a path divides; below, it goes one way by chance with all of its weight."""
 
+OFFSET = 0.3719
+"""Of a period: by how much lines are moved along y, so that none lies on the border of the period."""
+
 ARC_LINES = 48
 MAXIMUM_STEPS = 4000
+OLD = 60
+DIES = 0.03
+"""From step OLD on a path ends with this chance at each step, and counts for more if it does not: Russian roulette."""
+
+BLOCK = 2048
+"""Paths whose distances to all lines are held at once."""
+
 CLOSE = 1e-9
 """Of the period: a line nearer than this is the one that the path is on."""
 
@@ -76,10 +86,14 @@ class _Tracer:
 
     def trace(self, rays: int) -> Traced:
         paths = self._start(rays)
-        for _ in range(MAXIMUM_STEPS):
+        for step in range(MAXIMUM_STEPS):
             if not len(paths.weight):
                 break
             paths = self._step(paths)
+            if step > OLD:
+                lives = self.random.random(len(paths.weight)) > DIES
+                paths = paths.select(lives)
+                paths.weight = paths.weight / (1 - DIES)
         directions = np.concatenate([found for found, _ in self.exits] or [np.zeros((0, 3))])
         flux = np.concatenate([found for _, found in self.exits] or [np.zeros(0)])
         is_sent = directions[:, 2] * self.direction[2] > 0
@@ -123,17 +137,20 @@ class _Tracer:
         return _Paths.joined(parts)
 
     def _nearest(self, paths: _Paths) -> tuple[Float64, NDArray[np.int64]]:
-        nearest = np.full(len(paths.weight), np.inf)
-        which = np.full(len(paths.weight), -1)
-        dy, dz = paths.direction[:, 1], paths.direction[:, 2]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            for number, line in enumerate(self.lines):
-                ey, ez = line.b[0] - line.a[0], line.b[1] - line.a[1]
-                ty, tz = line.a[0] - paths.place[:, 0], line.a[1] - paths.place[:, 1]
+        """Distance to the first line on each path's way, infinite without one, and its number."""
+        nearest, which = np.full(len(paths.weight), np.inf), np.full(len(paths.weight), -1)
+        ends = np.array([(*line.a, *line.b) for line in self.lines])
+        ey, ez = ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1]
+        for start in range(0, len(nearest), BLOCK):
+            part = slice(start, start + BLOCK)
+            dy, dz = paths.direction[part, 1:2], paths.direction[part, 2:3]
+            ty, tz = ends[:, 0] - paths.place[part, 0:1], ends[:, 1] - paths.place[part, 1:2]
+            with np.errstate(divide="ignore", invalid="ignore"):
                 denominator = dy * ez - dz * ey
                 t, u = (ty * ez - tz * ey) / denominator, (ty * dz - tz * dy) / denominator
-                hit = (t > CLOSE * self.period) & (t < nearest) & (u >= 0) & (u <= 1)
-                nearest[hit], which[hit] = t[hit], number
+            t[~((t > CLOSE * self.period) & (u >= 0) & (u <= 1))] = np.inf
+            which[part] = np.argmin(t, axis=1)
+            nearest[part] = t[np.arange(len(t)), which[part]]
         return nearest, which
 
     def _meet(self, paths: _Paths, line: Line) -> list[_Paths]:
@@ -239,11 +256,16 @@ def _straight(line: Line) -> Iterator[Line]:
 
 def _copies(line: Line, period: float) -> Iterator[Line]:
     """The line where it and its repetitions lie within 0 <= y <= period."""
+    line = _shifted(line, OFFSET * period)
     low, high = sorted((line.a[0], line.b[0]))
     for k in range(int(np.floor(-high / period)), int(np.ceil(1 - low / period)) + 1):
         if low + k * period <= period and high + k * period >= 0:
-            a, b = ((y + k * period, z) for y, z in (line.a, line.b))
-            yield dataclasses.replace(line, a=a, b=b)
+            yield _shifted(line, k * period)
+
+
+def _shifted(line: Line, by: float) -> Line:
+    a, b = ((y + by, z) for y, z in (line.a, line.b))
+    return dataclasses.replace(line, a=a, b=b)
 
 
 def _perpendicular(directions: Float64) -> Float64:
@@ -258,4 +280,4 @@ def _fresnel(n1: Float64, n2: Float64, cosine: Float64) -> tuple[Complex128, Com
     inner = np.sqrt((1 - (n1 / n2) ** 2 * (1 - cosine**2)).astype(np.complex128))
     rs = (n1 * cosine - n2 * inner) / (n1 * cosine + n2 * inner)
     rp = (n2 * cosine - n1 * inner) / (n2 * cosine + n1 * inner)
-    return rs, rp, inner.real.astype(np.float64)
+    return rs.astype(np.complex128), rp.astype(np.complex128), inner.real.astype(np.float64)

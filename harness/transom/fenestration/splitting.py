@@ -44,7 +44,7 @@ def split(directions: Float64, flux: Float64, basis: AngleBasis, how: Splitting 
     remaining = np.array(flux, np.float64)
     lobes: list[Lobe] = []
     if remaining.size:
-        towards, carried, cell = _gathered(directions, remaining)
+        towards, carried, cell = gathered(directions, remaining)
         lobe_of = np.full(len(carried), -1)
         candidates = towards[np.argsort(-carried, kind="stable")[:CANDIDATES]]
         inside = candidates @ towards.T > math.cos(how.width_rad / 2)
@@ -64,7 +64,7 @@ def split(directions: Float64, flux: Float64, basis: AngleBasis, how: Splitting 
     return SunThrough(tuple(sorted(lobes, key=lambda lobe: -lobe.share)), residual)
 
 
-def _gathered(directions: Float64, flux: Float64) -> tuple[Float64, Float64, Int64]:
+def gathered(directions: Float64, flux: Float64) -> tuple[Float64, Float64, Int64]:
     """Mean directions (C, 3) and sums (C,) of the exits in each cell that has any, and the cell of each exit (N,)."""
     square = square_from_disc(directions[:, 0], directions[:, 1])
     column, row = np.minimum((square * CELLS).astype(np.int64), CELLS - 1).T

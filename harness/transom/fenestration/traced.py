@@ -13,7 +13,7 @@ from transom.bsdf.directions import AngleBasis
 from transom.fenestration.bins import PANEL_BINS, directions_within, mirror_in_x
 from transom.fenestration.splitting import split
 from transom.fenestration.through import SunThrough
-from transom.products.section import Section
+from transom.products.section import Exits, Section
 from transom.products.unit_cell import UnitCell
 
 Float64 = NDArray[np.float64]
@@ -46,12 +46,16 @@ class TracedFenestration:
     def sun(self, incident: Float64) -> SunThrough:
         return self._kept(tuple(float(v) for v in incident))
 
+    def exits(self, incident: Float64) -> Exits:
+        """All light of one direction (3,) that leaves into the room, before it is split."""
+        return self.geometry.trace(incident, SUN_RAYS, SEED).transmitted
+
     @cached_property
     def _kept(self) -> Callable[[tuple[float, ...]], SunThrough]:
         return lru_cache(maxsize=SUNS_KEPT)(self._traced_sun)
 
     def _traced_sun(self, incident: tuple[float, ...]) -> SunThrough:
-        exits = self.geometry.trace(incident, SUN_RAYS, SEED).transmitted
+        exits = self.exits(np.array(incident))
         return split(exits.directions, exits.flux, self.basis)
 
     @cached_property

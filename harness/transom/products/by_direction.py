@@ -58,7 +58,7 @@ class DirectionalMeasurement:
 
 def incident_grid(step_deg: float) -> Float64:
     """Directions (N, 3), z > 0, on rings of `step_deg` in polar angle, about as far apart along each ring; bin 0 of a
-    ring at azimuth 0. 144 directions at 12 degrees, 573 at 6."""
+    ring at azimuth 0. 144 directions at 12 degrees, 544 at 6."""
     rows: list[Float64] = []
     for ring in range(int(np.ceil(90 / step_deg - 1e-9))):
         theta = np.radians(ring * step_deg)
@@ -114,7 +114,7 @@ def write_by_direction(file: Path, found: DirectionalMeasurement) -> None:
 def read_by_direction(file: Path) -> DirectionalMeasurement:
     """Reads an .npz of `write_by_direction`. Raises InputError for a file that is none, or does not hold together."""
     try:
-        with np.load(file, allow_pickle=False) as content:
+        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as content:
             missing = [name for name in ARRAYS if name not in content.files]
             if missing:
                 raise InputError(

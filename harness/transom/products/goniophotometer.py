@@ -21,8 +21,15 @@ from transom.bsdf.bsdf import Bsdf, KlemsMatrix, Path, Spectrum
 from transom.bsdf.directions import KLEMS_FULL, AngleBasis
 from transom.files import write_atomic
 from transom.products.product import Product
+from transom.products.unit_cell import UnitCell
 
 Float64 = NDArray[np.float64]
+
+CLEAR_RAYS = 32
+CELL_RAYS = 128
+DIFFUSE_RAYS = 2048
+"""Rays of each direction. Exact beams between straight lines need none; a diffuse surface sends one ray a way, and each
+row of a table is to be hit many times."""
 
 SIDES = {
     1: (Path.transmission_front, Path.reflection_front),
@@ -39,7 +46,7 @@ class Measurement:
     transmittance, reflectance, absorptance, standard_error (2, B): hemispherical, by side (outdoors, room) and incident
     bin; standard_error is of the transmittance. Errors are of the mean over the directions in a bin, taken as if these
     were independent: they are spread evenly, so that the true errors are smaller.
-    worst_balance: largest |1 - transmitted - reflected - absorbed|; worst_unfinished: most light given up, in it.
+    worst_balance: of a bin, largest |1 - transmitted - reflected - absorbed|; worst_unfinished: most light given up.
     """
 
     product: Product
@@ -58,19 +65,22 @@ class Measurement:
 
 def measure(
     product: Product,
-    rays: int = 256,
-    directions: int = 16,
+    rays: int | None = None,
+    directions: int = 64,
     seed: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Measurement:
-    """Measures a product on the Klems basis. rays: for the light of one direction; directions: in each bin."""
+    """Measures a product on the Klems basis. rays: of one direction; directions: in each bin."""
     basis, tracer = KLEMS_FULL, product.tracer()
+    if rays is None:
+        rays = DIFFUSE_RAYS if tracer.is_diffuse else CELL_RAYS if isinstance(tracer, UnitCell) else CLEAR_RAYS
+    mirrored = basis.bin_of(basis.centres * np.array([-1.0, 1.0, 1.0]))
+    own = np.arange(basis.count) if isinstance(tracer, UnitCell) else np.flatnonzero(mirrored >= np.arange(basis.count))
     tables = {path: np.zeros((basis.count, basis.count)) for paths in SIDES.values() for path in paths}
     errors = {path: np.zeros((basis.count, basis.count)) for path in tables}
     shares = np.zeros((4, 2, basis.count, directions))  # transmitted, reflected, absorbed, unfinished
-    total = 2 * basis.count
     for row, (sign, (sent, back)) in enumerate(SIDES.items()):
-        for column in range(basis.count):
+        for done, column in enumerate(own.tolist()):
             binned = {path: np.zeros((directions, basis.count)) for path in (sent, back)}
             for number, direction in enumerate(directions_in(basis, column, directions, seed)):
                 light = tracer.trace(direction * np.array([1.0, 1.0, sign]), rays, seed + number)
@@ -87,12 +97,18 @@ def measure(
                 tables[path][:, column] = values.mean(axis=0)
                 errors[path][:, column] = _error_of_mean(values, 0)
             if progress is not None:
-                progress(row * basis.count + column + 1, total)
+                progress(row * len(own) + done + 1, 2 * len(own))
+        if len(own) < basis.count:  # a section is the same seen in a mirror: so are its columns
+            twins = mirrored[own]
+            for path in (sent, back):
+                for values in (tables[path], errors[path]):
+                    values[np.ix_(mirrored, twins)] = values[:, own]
+            shares[:, row, twins] = shares[:, row, own]
     solid = basis.projected_solid_angles[:, None]
     scattering = {(Spectrum.visible, path): KlemsMatrix(basis, table / solid) for path, table in tables.items()}
     low, high = tracer.depth
     bsdf = Bsdf(product.title, "", str(product.file), scattering, high - low, (product.record.uncertainty.strip(),))
-    transmittance, reflectance, absorptance, unfinished = shares.mean(axis=3)
+    transmittance, reflectance, absorptance, unfinished = means = shares.mean(axis=3)
     return Measurement(
         product=product,
         bsdf=bsdf,
@@ -101,7 +117,7 @@ def measure(
         reflectance=reflectance,
         absorptance=absorptance,
         standard_error=_error_of_mean(shares[0], 2),
-        worst_balance=float(np.abs(shares.sum(axis=0) - shares[3] - 1).max()),
+        worst_balance=float(np.abs(means.sum(axis=0) - unfinished - 1).max()),
         worst_unfinished=float(unfinished.max()),
         rays=rays,
         directions=directions,

@@ -103,6 +103,11 @@ class Section:
         z = [point[1] for line in self.lines for point in line.points()]
         return min(z), max(z)
 
+    @property
+    def is_diffuse(self) -> bool:
+        """Whether any of its lines scatters."""
+        return any(line.kind == "diffuse" for line in self.lines)
+
     @cached_property
     def _core(self) -> _engine.Section:
         low, high = self.depth

@@ -54,6 +54,11 @@ class UnitCell:
         z = self.corners[self.facets[:, :3].ravel(), 2]
         return float(z.min()), float(z.max())
 
+    @property
+    def is_diffuse(self) -> bool:
+        """Whether any of its surfaces scatters."""
+        return any(surface.kind == "diffuse" for surface in self.surfaces)
+
     @cached_property
     def _core(self) -> _engine.UnitCell:
         low, high = self.depth

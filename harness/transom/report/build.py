@@ -13,11 +13,13 @@ from transom.judge import Missing, Outcome, ToleranceFile, Verdict, exit_code, j
 from transom.report.checks import read_check
 from transom.report.content import Content, Pictures, make_content
 from transom.report.day import day_cases, find_day, render_missing
+from transom.report.fenestration import chapter_tables, make_chapter
 from transom.report.figure_13 import corner_errors, figure_13_cases, figure_13_strips
 from transom.report.junit import junit_xml
 from transom.report.notes import read_notes
 from transom.report.page import write_page
 from transom.report.pdf import write_pdf
+from transom.report.plots import make_plots
 from transom.report.results import collect_results, write_results
 from transom.report.sections import hour_grids, rooms, shows_views, strips, view_images
 from transom.report.speed import read_speed
@@ -52,6 +54,7 @@ def write_report(output: Path, build: Path, *, render: bool = True) -> int:
     cases = day_cases([suite for suite in suites if shows_views(suite)])
     if render:
         render_missing([*figure_13_cases(suites), *cases], note)
+        make_plots(build, note)
     pictures = Pictures(
         rooms=[room for suite in suites if shows_views(suite) for room in rooms(suite)],
         hours=[grid for suite in suites if suite.layout == "hours" for grid in hour_grids(suite, results)],
@@ -59,10 +62,13 @@ def write_report(output: Path, build: Path, *, render: bool = True) -> int:
         day=find_day(cases),
         figure_13=figure_13_strips(suites),
         corners=list(corner_errors(suites)),
+        fenestration=make_chapter(suites, results, build),
     )
     speed = read_speed(build, _judged_scenes(suites))
     images, checked = view_images(suites, results), read_check(build / "check" / "check.json")
-    content = make_content(results, images, pictures, speed, _tolerances(), notes, checked)
+    content = make_content(
+        results, images, pictures, speed, _tolerances(), notes, checked, chapter_tables(suites, results, speed, build)
+    )
     write_files(output, content, judged)
     return exit_code(verdict for _, verdicts in judged for verdict in verdicts)
 

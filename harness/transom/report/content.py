@@ -13,12 +13,13 @@ from transom.figures import TimingBar, timings_svg
 from transom.judge import ToleranceFile
 from transom.report import rows_images, rows_references, rows_speed, rows_verdicts
 from transom.report.day import Day
+from transom.report.fenestration import Chapter
 from transom.report.figure_13 import CornerError, corner_table
 from transom.report.notes import NotesSection
 from transom.report.numbers import fixed, seconds, signed, words
 from transom.report.pictures import Drawing
 from transom.report.results import Results
-from transom.report.sections import HourGrid, RoomSection, Strip
+from transom.report.sections import FENESTRATION, HourGrid, RoomSection, Strip, suite_rows
 from transom.report.speed import Speed, speed_drawing
 from transom.report.table import Table
 
@@ -53,6 +54,7 @@ class Pictures:
     day: Day | None
     figure_13: list[Strip]
     corners: list[CornerError]
+    fenestration: Chapter
 
 
 @dataclass(frozen=True)
@@ -79,15 +81,17 @@ def make_content(
     tolerances: ToleranceFile,
     notes: list[NotesSection],
     checked: Sequence[Checked] = (),
+    fenestration: Sequence[Table] = (),
 ) -> Content:
-    """images: rows of the suites that are shown view by view. checked: of `transom check`, where it has run."""
+    """images: rows of the suites that are shown view by view. checked: of `transom check`, where it has run.
+    fenestration: tables of that chapter."""
     build = engine_source(results)
     matrix = rows_verdicts.matrix(results)
     tables = [
         rows_verdicts.matrix_table(matrix),
         rows_verdicts.verdict_list(results),
         rows_images.table_1(images),
-        rows_images.regions(images),
+        rows_images.regions([*images, *suite_rows(results.images, [FENESTRATION])]),
         rows_images.sensors(results.sensors),
         rows_references.crosschecks(results.crosschecks),
         rows_references.model_errors(results.model_errors),
@@ -105,6 +109,7 @@ def make_content(
         rows_images.agreements(results.agreements),
         rows_verdicts.tolerance_use(tolerances, results),
         rows_verdicts.debt(tolerances),
+        *fenestration,
     ]
     drawings: dict[str, Drawing] = {}
     if results.timings:
@@ -116,11 +121,12 @@ def make_content(
     absent = [Absence(table.title, table.command) for table in tables if not table.rows and table.command]
     if not pictures.figure_13:
         absent.append(Absence("Figure 13 of the paper", "transom run crosscheck"))
+    absent += [Absence(order.caption, order.command) for order, plot in pictures.fenestration.plots if plot is None]
     if pictures.day is None:
         absent.append(Absence("A day relit", REPRODUCE))
     absent += [
         Absence(f"Reference of {words(room.title)}, {view.title.lower()}", "transom run references")
-        for room in pictures.rooms
+        for room in [*pictures.rooms, *pictures.fenestration.rooms]
         for view in room.views
         if view.viewer is None
     ]

@@ -15,7 +15,7 @@ from transom.report.viewer import shared_scales
 
 TEMPLATES = Path(__file__).resolve().parents[3] / "reports" / "templates"
 
-SCRIPTS = ("codec.js", "viewer_pixels.js", "viewer.js", "filters.js", "day.js")
+SCRIPTS = ("codec.js", "viewer_pixels.js", "viewer.js", "filters.js", "day.js", "prism_optics.js", "prism_figure.js")
 
 
 def write_page(path: Path, content: Content) -> None:

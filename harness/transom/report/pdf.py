@@ -53,7 +53,8 @@ def write_pdf(path: Path, content: Content) -> None:
 def _record(content: Content, folder: Path) -> dict[str, Any]:
     """What the template prints; pictures are files in `folder`."""
     tables = content.tables
-    groups = {view.group for room in content.pictures.rooms for view in room.views}
+    every_room = [*content.pictures.rooms, *content.pictures.fenestration.rooms]
+    groups = {view.group for room in every_room for view in room.views}
     return {
         "created": f"{content.results.created:%-d %B %Y}",
         "reproduce": REPRODUCE,
@@ -101,6 +102,24 @@ def _record(content: Content, folder: Path) -> dict[str, Any]:
                 "pictures": [_picture(item, folder) for item in strip.pictures],
             }
             for strip in content.pictures.figure_13
+        ],
+        "products": [
+            {"title": room.title, "condition": view.condition, "group": view.group, "source": view.viewer.source}
+            for room in content.pictures.fenestration.rooms
+            for view in room.views
+            if view.viewer
+        ],
+        "plots": [_picture(plot, folder) for _, plot in content.pictures.fenestration.plots if plot],
+        "galleries": [
+            {
+                "title": gallery.title,
+                "condition": gallery.condition,
+                "white": gallery.white,
+                "pictures": [
+                    _picture(item, folder) for cell in gallery.cells for item in (cell.ours, cell.reference) if item
+                ],
+            }
+            for gallery in content.pictures.fenestration.galleries
         ],
         "notes": [asdict(section) for section in content.notes],
         "provenance": [{"name": name, "text": text} for name, text in content.provenance],

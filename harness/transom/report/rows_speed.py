@@ -44,6 +44,7 @@ TIMING_WORDS = {
     "solve": "Solve (geometry and reflectance)",
     "relight": "Relight (a new sun and sky)",
     "reglaze": "New glazing (solve and relight)",
+    "new_product": "New product (traced, and its light)",
     "relight_hour": "Relight (a new hour)",
     "relight_sky": "Relight (a new sky only)",
     "relight_overcast": "Relight (overcast, no beam)",

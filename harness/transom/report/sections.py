@@ -16,6 +16,9 @@ from transom.report.rows_images import HEADLINE_METHOD, view_group
 from transom.report.viewer import Viewer, make_viewer
 from transom.suite import Suite, SuiteCase
 
+FENESTRATION = "fenestration"
+"""The suite that has a chapter of its own."""
+
 
 @dataclass(frozen=True)
 class ViewSection:
@@ -68,7 +71,7 @@ class Strip:
 
 
 def shows_views(suite: Suite) -> bool:
-    return suite.layout == "views" and suite.reference == "mitsuba"
+    return suite.layout == "views" and suite.reference == "mitsuba" and suite.name != FENESTRATION
 
 
 def rooms(suite: Suite) -> list[RoomSection]:
@@ -120,7 +123,7 @@ def hour_grids(suite: Suite, results: Results) -> list[HourGrid]:
                 cells[_day_and_hour(entry)] = HourCell(
                     illustration("Transom", found.volumes, view) if found.volumes else None,
                     illustration("Mitsuba 3", found.reference, view) if found.reference else None,
-                    _error_words(results, suite, entry, view.name),
+                    error_words(results, suite, entry, view.name),
                 )
             days = list(dict.fromkeys(day for day, _ in cells))
             hours = sorted({hour for _, hour in cells})
@@ -145,11 +148,16 @@ def strips(suite: Suite) -> list[Strip]:
 
 def view_images(suites: Sequence[Suite], results: Results) -> list[Any]:
     """The rows of suites that are shown view by view."""
-    names = {suite.name for suite in suites if shows_views(suite)}
-    return [row for row in results.images if row.suite in names]  # type: ignore[attr-defined]
+    return suite_rows(results.images, [suite.name for suite in suites if shows_views(suite)])
 
 
-def _error_words(results: Results, suite: Suite, entry: SuiteCase, view: str) -> str:
+def suite_rows(rows: Sequence[Any], names: Sequence[str]) -> list[Any]:
+    """Those of some suites."""
+    return [row for row in rows if row.suite in names]
+
+
+def error_words(results: Results, suite: Suite, entry: SuiteCase, view: str) -> str:
+    """The mean error of a view's interior by the headline method; "" where it was not compared."""
     wanted = (suite.name, entry.scene.name, entry.condition.name, view, "interior", HEADLINE_METHOD)
     rows: list[Any] = list(results.images)
     for row in rows:

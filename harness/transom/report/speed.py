@@ -19,25 +19,32 @@ from transom.speed_error import SpeedError, read_speed_error
 
 LOAD_REPEATS = 3
 
+AGAINST = "-against"
+"""Ends the names of files that compare two builds."""
+
 
 @dataclass(frozen=True)
 class Speed:
-    """loads_s: seconds to read each scene. benches: one a scene. speed_error: None where it was not measured."""
+    """loads_s: seconds to read each scene. benches: one a scene. variants: of scenes with other glazing. speed_error:
+    None where it was not measured."""
 
     loads_s: dict[str, float]
     benches: Sequence[Bench]
     speed_error: SpeedError | None
+    variants: Sequence[Bench] = ()
 
 
 def read_speed(build: Path, scenes: Iterable[str]) -> Speed:
     """What is there; nothing where `transom bench` has not run. Raises InputError for a malformed file."""
     names = list(scenes)
     files = [path for name in names if (path := build / "bench" / f"{name}.json").is_file()]
+    others = [file for name in names for file in sorted((build / "bench").glob(f"{name}-*.json"))]
     path = build / "bench" / "speed_error.json"
     return Speed(
         loads_s={name: _load_seconds(name) for name in names},
         benches=[read_bench(file) for file in files],
         speed_error=read_speed_error(path) if path.is_file() else None,
+        variants=[read_bench(file) for file in others if not file.stem.endswith(AGAINST)],
     )
 
 

@@ -1,0 +1,81 @@
+#include "transom/beam_outlines.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "transom/sampling.h"
+
+namespace transom {
+namespace {
+
+constexpr float kMarginOffsets = 4;  // of Faces::ray_offset: what rounding and lifted points may shift an outline by
+
+// Whether an edge of `a` parts two convex polygons by more than the margin [separating axes].
+bool has_separating_edge(const BeamOutline& a, const BeamOutline& b, float margin) {
+  for (int k = 0; k < a.corner_count; ++k) {
+    const glm::vec2 from = a.corner[k], edge = a.corner[(k + 1) % a.corner_count] - from;
+    const glm::vec2 out = glm::vec2(edge.y, -edge.x);
+    const auto side = [&](const BeamOutline& polygon) {
+      float least = std::numeric_limits<float>::max(), most = -least;
+      for (int i = 0; i < polygon.corner_count; ++i) {
+        const float distance = glm::dot(out, polygon.corner[i] - from);
+        least = std::min(least, distance);
+        most = std::max(most, distance);
+      }
+      return glm::vec2(least, most);
+    };
+    const glm::vec2 own = side(a), other = side(b);
+    const float gap = std::max(other.x - own.y, own.x - other.y);
+    if (gap > margin * glm::length(out)) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+BeamOutlines::BeamOutlines(const Faces& faces, const std::vector<int>& passages, glm::vec3 direction_to_source)
+    : margin_(kMarginOffsets * faces.ray_offset()) {
+  towards_ = glm::normalize(direction_to_source);
+  const glm::mat3 frame = frame_from_normal(towards_);
+  across_ = frame[0];
+  along_ = frame[1];
+  for (const int f : passages) {
+    const Face& face = faces.faces[static_cast<std::size_t>(f)];
+    passages_.push_back(outline({face.corner, face.is_quad ? 4u : 3u}));
+  }
+}
+
+BeamOutline BeamOutlines::outline(std::span<const glm::vec3> corners) const {
+  BeamOutline result;
+  result.corner_count = static_cast<int>(corners.size());
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    const glm::vec2 place(glm::dot(corners[k], across_), glm::dot(corners[k], along_));
+    const float depth = glm::dot(corners[k], towards_);
+    result.corner[k] = place;
+    result.low = k == 0 ? place : glm::min(result.low, place);
+    result.high = k == 0 ? place : glm::max(result.high, place);
+    result.nearest = k == 0 ? depth : std::min(result.nearest, depth);
+    result.farthest = k == 0 ? depth : std::max(result.farthest, depth);
+  }
+  return result;
+}
+
+bool BeamOutlines::covers(const BeamOutline& passage, const BeamOutline& polygon) const {
+  if (passage.farthest < polygon.nearest - margin_) return false;
+  for (int axis = 0; axis < 2; ++axis)
+    if (passage.low[axis] > polygon.high[axis] + margin_ || polygon.low[axis] > passage.high[axis] + margin_)
+      return false;
+  return !has_separating_edge(passage, polygon, margin_) && !has_separating_edge(polygon, passage, margin_);
+}
+
+void BeamOutlines::covering(const BeamOutline& polygon, std::vector<int>& passages) const {
+  passages.clear();
+  for (std::size_t k = 0; k < passages_.size(); ++k)
+    if (covers(passages_[k], polygon)) passages.push_back(static_cast<int>(k));
+}
+
+bool BeamOutlines::is_covered(const BeamOutline& polygon, const std::vector<int>& passages) const {
+  return std::any_of(passages.begin(), passages.end(), [&](int k) { return covers(passages_[k], polygon); });
+}
+
+}  // namespace transom

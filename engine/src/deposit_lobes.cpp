@@ -1,0 +1,151 @@
+// Lobes of panels on points and elements: the part of an element inside a shaft is exact, what stands in the way is
+// found by rays.
+#include <algorithm>
+#include <cmath>
+
+#include "transom/deposit.h"
+#include "transom/first_bounce.h"
+#include "transom/parallel.h"
+#include "transom/sampling.h"
+
+namespace transom {
+namespace {
+
+constexpr std::size_t kGrain = 4;
+constexpr std::uint32_t kRaysPerPart = 4;          // to a part of an element, to find out whether all of it is lit
+constexpr std::uint32_t kRefinedRaysPerPart = 32;  // where some of it is
+
+// The part of an element inside a shaft.
+struct LitPart {
+  int element;
+  std::vector<glm::vec3> corner;
+  float area_share;  // of the element
+};
+
+// Point of a convex polygon, uniform by area for each of the fan's triangles alike.
+glm::vec3 point_of(const std::vector<glm::vec3>& corner, glm::vec2 u) {
+  float total = 0;
+  const auto area = [&](std::size_t k) {
+    return glm::length(glm::cross(corner[k - 1] - corner[0], corner[k] - corner[0]));
+  };
+  for (std::size_t k = 2; k < corner.size(); ++k) total += area(k);
+  float rest = u.x * total;
+  std::size_t k = 2;
+  for (; k + 1 < corner.size() && rest >= area(k); ++k) rest -= area(k);
+  const glm::vec2 b = sample_triangle({std::clamp(rest / std::max(area(k), 1e-30f), 0.f, 1.f), u.y});
+  return corner[0] + b.x * (corner[k - 1] - corner[0]) + b.y * (corner[k] - corner[0]);
+}
+
+}  // namespace
+
+void DirectLight::shaft_transmission(const Beam& lobe, std::span<const glm::vec3> points,
+                                     std::span<float> share) const {
+  thread_local std::vector<Ray> rays;
+  thread_local std::vector<std::size_t> index;
+  thread_local std::vector<std::uint8_t> blocked;
+  std::fill(share.begin(), share.end(), 0.f);
+  if (points.empty() || !lobe.shafts) return;
+  rays.clear();
+  index.clear();
+  glm::vec3 low = points[0], high = low;
+  for (const glm::vec3& point : points) {
+    low = glm::min(low, point);
+    high = glm::max(high, point);
+  }
+  for (const LightShaft& shaft : *lobe.shafts) {
+    if (!shaft.may_meet(low, high)) continue;
+    const float cosine = -glm::dot(glm::vec3(shaft.plane), lobe.direction_to_source);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (share[i] > 0 || !shaft.holds(points[i])) continue;
+      share[i] = shaft.share;
+      const float distance = glm::dot(shaft.plane, glm::vec4(points[i], 1)) / cosine;
+      rays.push_back({points[i], lobe.direction_to_source, 0, distance - mesh_.faces().ray_offset() / cosine});
+      index.push_back(i);
+    }
+  }
+  blocked.resize(rays.size());
+  rays_.occluded(RayScene::What::kAll, rays, blocked, RayScene::Order::kCoherent);
+  for (std::size_t k = 0; k < rays.size(); ++k)
+    if (blocked[k]) share[index[k]] = 0;
+}
+
+// Receivers whose corners' box a shaft may meet, on the side that faces the lobe.
+std::vector<std::size_t> DirectLight::reached_by_lobe(const Beam& lobe, const Receivers& receivers) const {
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < receivers.slots.size() && !lobe.shafts->empty(); ++i) {
+    if (glm::dot(lobe.direction_to_source, receivers.normals[i]) <= 0) continue;
+    const Corners& corner = receivers.corners[i];
+    const glm::vec3 low = glm::min(glm::min(corner[0], corner[1]), glm::min(corner[2], corner[3]));
+    const glm::vec3 high = glm::max(glm::max(corner[0], corner[1]), glm::max(corner[2], corner[3]));
+    if (std::any_of(lobe.shafts->begin(), lobe.shafts->end(),
+                    [&](const LightShaft& shaft) { return shaft.may_meet(low, high); }))
+      found.push_back(i);
+  }
+  return found;
+}
+
+// Adds a lobe to the light of elements, by receiver.
+void DirectLight::add_lobe(const Beam& lobe, const Receivers& receivers, std::uint32_t seed,
+                           std::vector<std::vector<glm::vec3>>& sum) const {
+  const std::vector<std::size_t> candidates = reached_by_lobe(lobe, receivers);
+  const auto per_slot = static_cast<std::size_t>(mesh_.elements_per_slot());
+  parallel_indices(candidates.size(), kGrain, [&](std::size_t k) {
+    const std::size_t i = candidates[k];
+    std::vector<float> mean;
+    lobe_on_slot(lobe, receivers.slots[i], seed, mean);
+    const glm::vec3 full = lobe.normal_illuminance * glm::dot(lobe.direction_to_source, receivers.normals[i]);
+    sum[i].resize(per_slot, glm::vec3(0));
+    for (std::size_t e = 0; e < per_slot; ++e) sum[i][e] += mean[e] * full;
+  });
+}
+
+// Mean share of a lobe on each element of a slot.
+void DirectLight::lobe_on_slot(const Beam& lobe, int slot_index, std::uint32_t seed, std::vector<float>& mean) const {
+  mean.assign(static_cast<std::size_t>(mesh_.elements_per_slot()), 0.f);
+  const Slot slot = mesh_.slot(slot_index);
+  const Face& face = mesh_.faces().faces[static_cast<std::size_t>(slot.face)];
+  const glm::vec3 lift = mesh_.faces().ray_offset() * (slot.side == 0 ? face.normal : -face.normal);
+  std::vector<LitPart> parts;
+  std::vector<Ray> rays;
+  std::vector<std::uint8_t> blocked;
+  for (const LightShaft& shaft : *lobe.shafts) {
+    parts.clear();
+    for (int e = 0; e < mesh_.elements_per_slot(); ++e) {
+      ElementShape shape = element_shape(mesh_, slot_index * mesh_.elements_per_slot() + e);
+      for (glm::vec3& c : shape.corner) c += lift;
+      const std::span<const glm::vec3> outline(shape.corner, static_cast<std::size_t>(shape.corner_count));
+      std::vector<glm::vec3> inside = clip_to_shaft(outline, shaft);
+      const double share = inside.empty() ? 0 : polygon_area(inside) / std::max(polygon_area(outline), 1e-30);
+      if (share > 0) parts.push_back({e, std::move(inside), static_cast<float>(std::min(share, 1.0))});
+    }
+    if (parts.empty()) continue;
+    const float cosine = -glm::dot(glm::vec3(shaft.plane), lobe.direction_to_source);
+    const auto cast = [&](std::uint32_t count) {
+      rays.clear();
+      for (const LitPart& part : parts) {
+        const SobolSequence sequence(
+            hash_seed(seed, static_cast<std::uint64_t>(slot_index) * mesh_.elements_per_slot() + part.element));
+        for (std::uint32_t i = 0; i < count; ++i) {
+          const glm::vec3 point = point_of(part.corner, sequence.point2(i));
+          const float distance = glm::dot(shaft.plane, glm::vec4(point, 1)) / cosine;
+          rays.push_back({point, lobe.direction_to_source, 0, distance - mesh_.faces().ray_offset() / cosine});
+        }
+      }
+      blocked.resize(rays.size());
+      rays_.occluded(RayScene::What::kAll, rays, blocked, RayScene::Order::kCoherent);
+    };
+    std::uint32_t count = kRaysPerPart;
+    cast(count);
+    const auto dark = std::count(blocked.begin(), blocked.end(), 1);
+    if (dark == static_cast<std::ptrdiff_t>(blocked.size())) continue;
+    if (dark > 0) cast(count = kRefinedRaysPerPart);
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+      const auto first = blocked.begin() + static_cast<std::ptrdiff_t>(k * count);
+      const auto seen = std::count(first, first + static_cast<std::ptrdiff_t>(count), 0);
+      mean[static_cast<std::size_t>(parts[k].element)] +=
+          shaft.share * parts[k].area_share * static_cast<float>(seen) / static_cast<float>(count);
+    }
+  }
+}
+
+}  // namespace transom
