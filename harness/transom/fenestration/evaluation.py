@@ -18,6 +18,7 @@ from transom.fenestration.moved_flux import as_points, moved_share
 from transom.fenestration.paper_modes import greedy_split
 from transom.fenestration.path_tracer import trace_paths
 from transom.fenestration.splitting import split
+from transom.fenestration.through import SunThrough
 from transom.fenestration.traced import TracedFenestration
 from transom.products.by_direction import incident_grid
 from transom.products.product import Product
@@ -51,7 +52,7 @@ class ProductEvaluation(BaseModel):
 
     represented: by width (rows, WIDTHS_DEG) and count (columns, COUNTS), the mean over incident directions of the
     share of the transmitted light that lies in so many greedy cones; represented_least: the least.
-    moved_*: mean share of the light that a direction left out of the table must be moved by more than 11.5 degrees.
+    moved_*: of all light of the directions left out in turn, the share that must be moved by more than 11.5 degrees.
     traced, tabulated: errors in the room, of lobes + residual at the actual sun and between directions 6 degrees apart;
     tracer: of the engine's rays without any representation. sky: errors under a clear sky, one row.
     transmittance_*: greatest difference over the suns from a second tracer's, whose own uncertainty stands beside it.
@@ -85,7 +86,7 @@ def evaluate(
     coarse_incident, coarse = _exits(fenestration, COARSE_STEP_DEG)
     represented = np.array([_represented(exits) for exits in coarse if exits.total > 0])
     _tell(progress, 1)
-    moved = np.array(_left_out(coarse_incident, coarse, every)).mean(axis=0)
+    moved = _left_out(coarse_incident, coarse, every)
     _tell(progress, 2)
     errors, differences, uncertainty, split_difference = _room_errors(fenestration, rays)
     _tell(progress, 3)
@@ -133,27 +134,25 @@ def _represented(exits: Exits) -> Float64:
     return shares
 
 
-def _left_out(incident: Float64, exits: list[Exits], every: int) -> list[tuple[float, float, float, float]]:
-    """For each direction left out, the share of its light that is put elsewhere: ours; the same lobes by rank; the
-    paper's three cones by rank; the nearest direction's light."""
+def _left_out(incident: Float64, exits: list[Exits], every: int) -> Float64:
+    """Each of some directions is left out in turn: the share of their light that is put elsewhere (4,), by our lobes;
+    by the same lobes in rank; by the paper's three cones in rank; by the nearest direction's light."""
     tight = [split(light.directions, light.flux, PANEL_BINS) for light in exits]
     wide = [greedy_split(light.directions, light.flux, PANEL_BINS) for light in exits]
-    found = []
-    candidates = np.flatnonzero(incident[:, 2] > math.cos(math.radians(MAXIMUM_POLAR_DEG)))[1::every]
-    for left in candidates:
-        if exits[left].total <= 0:
-            continue
+    moved, total = np.zeros(4), 0.0
+    for left in np.flatnonzero(incident[:, 2] > math.cos(math.radians(MAXIMUM_POLAR_DEG)))[1::every]:
         kept = np.delete(np.arange(len(incident)), left)
         truth = (exits[left].directions, exits[left].flux)
-        predictions = []
+        predictions: list[SunThrough] = []
         for through, is_by_rank in ((tight, False), (tight, True), (wide, True)):
             table = LobeTable(incident[kept], [through[k] for k in kept], PANEL_BINS, is_by_rank)
             predictions.append(table.at(incident[left]))
-        nearest = kept[int(np.argmax(incident[kept] @ incident[left]))]
-        predictions.append(tight[nearest])
-        shares = [moved_share(as_points(prediction, PANEL_BINS), truth) for prediction in predictions]
-        found.append((shares[0], shares[1], shares[2], shares[3]))
-    return found
+        predictions.append(tight[kept[int(np.argmax(incident[kept] @ incident[left]))]])
+        if exits[left].total > 0:
+            shares = [moved_share(as_points(prediction, PANEL_BINS), truth) for prediction in predictions]
+            moved += exits[left].total * np.array(shares)
+            total += exits[left].total
+    return moved / max(total, 1e-300)
 
 
 def _room_errors(fenestration: TracedFenestration, rays: int) -> tuple[Float64, Float64, float, float]:
@@ -161,6 +160,7 @@ def _room_errors(fenestration: TracedFenestration, rays: int) -> tuple[Float64, 
     differences of transmittance (suns,), the second tracer's standard error of their mean, and the largest difference
     between lobes + residual and the rays that were split."""
     bins = bin_landing(PANEL_BINS)
+    dark = DARK * float(illuminance(np.zeros(len(TARGETS)), 1.0)[0])
     incident, exits = _exits(fenestration, FINE_STEP_DEG)
     table = LobeTable(incident, [split(light.directions, light.flux, PANEL_BINS) for light in exits], PANEL_BINS)
     suns = sun_directions()
@@ -180,8 +180,7 @@ def _room_errors(fenestration: TracedFenestration, rays: int) -> tuple[Float64, 
                 (landed(own.directions, own.flux), own.total),
             )
         ):
-            found = illuminance(direct, total)
-            errors[which, row] = np.where(truth > 0, found / np.where(truth > 0, truth, 1) - 1, np.sign(found))
+            errors[which, row] = (illuminance(direct, total) - truth) / np.maximum(truth, dark)
         differences[row] = through.total - float(flux.sum())
         spread[row] = (halves[0].total - halves[1].total) / 2
         split_difference = max(split_difference, abs(through.total - own.total))
@@ -190,11 +189,20 @@ def _room_errors(fenestration: TracedFenestration, rays: int) -> tuple[Float64, 
 
 
 def _independent(fenestration: TracedFenestration, sun: Float64, rays: int, seed: int) -> Exits:
-    """Light of another tracer; of unit cells, which it does not know, of other and more rays."""
+    """Light of another tracer; of unit cells, which it does not know, of other and more rays. More for diffuse light,
+    fewer where curved glass guides it far."""
     if isinstance(fenestration.geometry, Section):
+        lines = fenestration.geometry.lines
+        is_diffuse = any(line.kind == "diffuse" for line in lines)
+        is_curved = any(line.bow for line in lines) and any(line.kind == "interface" for line in lines)
+        rays = rays * 16 if is_diffuse else rays // 8 if is_curved else rays
         return trace_paths(fenestration.geometry, sun, rays, seed).transmitted
     return fenestration.geometry.trace(sun, 16 * rays, seed).transmitted
 
+
+DARK = 0.01
+"""Errors are relative to at least so much of the interreflected light behind a panel that transmits everything: where
+next to nothing is transmitted, a ratio says nothing."""
 
 SKY_SUN = 10
 """Of the suns, the one under which the clear sky stands: an equinox morning."""

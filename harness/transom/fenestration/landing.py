@@ -90,8 +90,8 @@ def landed_represented(through: SunThrough, bins: Float64) -> Float64:
     """Lobes and residual: the flux on each target, directly (4,). bins: bin_landing of the basis."""
     total = through.residual @ bins
     if through.lobes:
-        directions = np.array([lobe.direction for lobe in through.lobes])
-        total = total + np.array([lobe.share for lobe in through.lobes]) @ landing(directions)
+        lobes = through.parallel_lobes
+        total = total + np.array([lobe.share for lobe in lobes]) @ landing(np.array([lobe.direction for lobe in lobes]))
     return np.asarray(total)
 
 

@@ -61,7 +61,7 @@ def panel_light(scene: Scene, condition: Condition) -> tuple[PanelLight, ...]:
         on_panel_rgb = condition.sun_illuminance_rgb * incident[2]
         beams = tuple(
             PanelBeam(group.to_world(lobe.direction), on_panel_rgb * (lobe.share / lobe.direction[2]))
-            for lobe in through.lobes
+            for lobe in through.parallel_lobes
         )
         per_bin = through.residual / fenestration.basis.projected_solid_angles
         lights.append(PanelLight(index, beams, per_bin[:, None] * on_panel_rgb))

@@ -26,7 +26,7 @@ DIVIDES_ABOVE = 0.05
 OFFSET = 0.3719
 """Of a period: by how much lines are moved along y, so that none lies on the border of the period."""
 
-ARC_LINES = 48
+ARC_LINES = 96
 MAXIMUM_STEPS = 4000
 OLD = 60
 DIES = 0.03

@@ -12,7 +12,7 @@ from transom.errors import InputError
 from transom.fenestration.choice import choose_product, is_file
 from transom.glass import MAX_TRANSMITTANCE
 from transom.scene import load_scene
-from transom.scene.model import Opening, Scene
+from transom.scene.model import Opening, ProductChoice, Scene
 
 CLEAR = re.compile(r"clear(?::(?P<transmittance>[0-9.]+))?")
 PRODUCT = re.compile(r"(?P<name>[^()]+?)\s*(?:\((?P<parameters>[^()]*)\))?")
@@ -79,16 +79,21 @@ def _glazed(opening: Opening, glazing: str) -> Opening:
             problem = f"has a transmittance outside 0..{MAX_TRANSMITTANCE:.4f}"
             raise InputError(problem, field=f"glazing of {opening.name}", value=glazing)
         return dataclasses.replace(opening, glazing="clear", visible_transmittance=share, product=None)
-    found = PRODUCT.fullmatch(glazing)
+    product = named_product(glazing, f"glazing of {opening.name}")
+    return dataclasses.replace(opening, glazing="product", visible_transmittance=0.0, product=product)
+
+
+def named_product(text: str, field: str = "product") -> ProductChoice:
+    """A product as it is written: its name, with parameters in brackets, or a BSDF file. Raises InputError."""
+    found = PRODUCT.fullmatch(text.strip())
     if not found:
         raise InputError(
             "is not a glazing",
-            field=f"glazing of {opening.name}",
-            value=glazing,
+            field=field,
+            value=text,
             remedy="Write none, clear:0.82, a product such as prismatic_panel(angle_low=30), or a BSDF file",
         )
-    product = choose_product(found["name"], _parameters(found["parameters"] or "", glazing))
-    return dataclasses.replace(opening, glazing="product", visible_transmittance=0.0, product=product)
+    return choose_product(found["name"], _parameters(found["parameters"] or "", text))
 
 
 def _parameters(text: str, glazing: str) -> dict[str, float]:

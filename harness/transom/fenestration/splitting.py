@@ -17,6 +17,9 @@ Int64 = NDArray[np.int64]
 CELLS = 192
 """Cells along a side of the square on which the hemisphere is laid out before lobes are sought: about 0.5 degrees."""
 
+LINE = 3.0
+"""A lobe so many times longer than broad counts as a line."""
+
 CANDIDATES = 96
 """Brightest cells that are tried as the middle of a lobe."""
 
@@ -100,9 +103,16 @@ def _cone(towards: Float64, left: Float64, axis: Float64, how: Splitting) -> Int
 
 
 def _lobe(towards: Float64, flux: Float64) -> Lobe:
-    """Direction: mean by flux. Width: of the cone, evenly filled, with the same mean squared angle from its middle."""
+    """Direction: mean by flux. Width: of the cone, evenly filled, with the same mean squared angle from its middle.
+    A lobe three times as long as broad is a line with the same variance."""
     mean = flux @ towards
     direction = mean / np.linalg.norm(mean)
     share = float(flux.sum())
-    chord2 = ((towards - direction) ** 2).sum(axis=1)
-    return Lobe(direction, share, 2 * math.sqrt(2 * float(flux @ chord2) / share))
+    apart = towards - direction
+    moments = (apart * flux[:, None]).T @ apart / share
+    variances, axes = np.linalg.eigh(moments)
+    along = axes[:, 2] - (axes[:, 2] @ direction) * direction
+    is_line = variances[2] > LINE**2 * max(float(variances[1]), 0.0)
+    length = math.sqrt(3 * float(variances[2])) if variances[2] > 0 else 0.0
+    width = 2 * math.sqrt(2 * max(0.0, float(np.trace(moments))))
+    return Lobe(direction, share, width, length * along if is_line and length > 0 else None)

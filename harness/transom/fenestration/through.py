@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -13,17 +14,38 @@ from transom.bsdf.directions import AngleBasis
 Float64 = NDArray[np.float64]
 
 
+PART_RAD = math.radians(1.5)
+"""Light of one direction at most so wide counts as parallel: 0.13 m of soft edge at 5 m, narrower than
+most eyes look for."""
+
+
 @dataclass(frozen=True)
 class Lobe:
     """Light that leaves a product almost parallel, in the product's frame (transom.bsdf.directions).
 
     direction: unit direction of propagation (3,), z > 0: into the room. share: of the flux incident on the product,
-    0..1. width_rad: full angle of the cone that it stands for; 0 is parallel light.
+    0..1. width_rad: full angle of the cone that it stands for; 0 is parallel light. along: for a lobe that is longer
+    than broad, such as light from a curved mirror, a vector across the direction (3,): its tip and its opposite are
+    where the lobe ends [rad].
     """
 
     direction: Float64
     share: float
     width_rad: float = 0.0
+    along: Float64 | None = None
+
+    def parallel_parts(self, most_rad: float = PART_RAD) -> tuple[Lobe, ...]:
+        """The lobe as parts beside each other along its length, none longer than `most_rad`, of equal shares; itself
+        where it is short or round. Their shadows overlap as the soft edge of the lobe's."""
+        length = 2 * float(np.linalg.norm(self.along)) if self.along is not None else 0.0
+        count = int(np.ceil(length / most_rad - 1e-9))
+        if count < 2 or self.along is None or self.direction[2] <= abs(self.along[2]):
+            return (self,)
+        places = (2 * np.arange(count) + 1 - count) / count
+        vectors = self.direction + places[:, None] * self.along
+        vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
+        share, width = self.share / count, self.width_rad / count
+        return tuple(Lobe(vector, share, width) for vector in vectors)
 
 
 @dataclass(frozen=True)
@@ -36,6 +58,11 @@ class SunThrough:
 
     lobes: tuple[Lobe, ...]
     residual: Float64
+
+    @property
+    def parallel_lobes(self) -> tuple[Lobe, ...]:
+        """The lobes as parts that are near enough to parallel light."""
+        return tuple(part for lobe in self.lobes for part in lobe.parallel_parts())
 
     @property
     def total(self) -> float:

@@ -18,8 +18,10 @@ from transom.products.unit_cell import UnitCell
 
 Float64 = NDArray[np.float64]
 
-SUN_RAYS = 1024
-"""Rays over a period for the sun."""
+SUN_RAYS = 4096
+GUIDED_RAYS = 1024
+"""Rays that stand for the sun where surfaces are diffuse or curved; fewer where curved glass guides light far, and in
+unit cells. Between flat faces light is followed as beams, exactly."""
 
 BIN_DIRECTIONS = 16
 BIN_RAYS = 16
@@ -48,7 +50,10 @@ class TracedFenestration:
 
     def exits(self, incident: Float64) -> Exits:
         """All light of one direction (3,) that leaves into the room, before it is split."""
-        return self.geometry.trace(incident, SUN_RAYS, SEED).transmitted
+        is_costly = not isinstance(self.geometry, Section) or any(
+            line.bow and line.kind == "interface" for line in self.geometry.lines
+        )
+        return self.geometry.trace(incident, GUIDED_RAYS if is_costly else SUN_RAYS, SEED).transmitted
 
     @cached_property
     def _kept(self) -> Callable[[tuple[float, ...]], SunThrough]:
