@@ -19,11 +19,14 @@ from transom_reference.mitsuba_setup import dr, floats, mi
 
 Float64 = NDArray[np.float64]
 
-PERIODS = 40
+PERIODS = 12
 """Periods on either side of the one into which particles are put back after each hit."""
 
-HALF_WIDTH = 40.0
+HALF_WIDTH = 12.0
 """Half the extruded length, in periods."""
+
+CHORDS = 512
+"""Straight pieces, less one, of an arc: each turns light by up to its share of the arc's angle."""
 
 STEP = 2e-5
 """Particles go on this far from a facet, in periods."""
@@ -34,11 +37,16 @@ MAX_HITS = 300
 class SectionLine(Protocol):
     """A line between media (transom.products.section): interfaces, and mirrors of both sides."""
 
-    kind: str
-    left: int
-    right: int
-    reflectance: float
-    reflectance_right: float
+    @property
+    def kind(self) -> str: ...
+    @property
+    def left(self) -> int: ...
+    @property
+    def right(self) -> int: ...
+    @property
+    def reflectance(self) -> float: ...
+    @property
+    def reflectance_right(self) -> float: ...
 
     def points(self, count: int = 24) -> Sequence[tuple[float, float]]: ...
 
@@ -46,9 +54,10 @@ class SectionLine(Protocol):
 class SectionGeometry(Protocol):
     """One period of a product: media as (index of refraction, absorption [1/m]), the first is air."""
 
-    period_m: float
-    media: tuple[tuple[float, float], ...]
-
+    @property
+    def period_m(self) -> float: ...
+    @property
+    def media(self) -> tuple[tuple[float, float], ...]: ...
     @property
     def lines(self) -> Sequence[SectionLine]: ...
 
@@ -86,7 +95,7 @@ class Microgeometry:
         for line in section.lines:
             if line.kind not in ("interface", "mirror"):
                 raise ValueError(f"lines of kind {line.kind!r} have no geometry of their own here")
-            ends = np.array(line.points(64)) / self.period
+            ends = np.array(line.points(CHORDS)) / self.period
             is_mirror = float(line.kind == "mirror")
             for a, b in itertools.pairwise(ends):
                 side = [line.left, line.right, is_mirror, line.reflectance, line.reflectance_right]

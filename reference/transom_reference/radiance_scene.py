@@ -3,7 +3,9 @@
 Opaque surfaces are `plastic` without gloss, both sides alike. A pane is a `BRTDfunc` whose function file computes the
 angular transmittance from Fresnel's equations, apart from the table that other renderers share, so that each checks
 the other. Its room side reflects the hemispherical reflectance diffusely (matched), or the directional one as a mirror
-(full physics). A smooth face bends its normal by a `texfunc`.
+(full physics). A product's BSDF file is Radiance's BSDF material: right for light from the sky and for the sun's where
+it is spread; where a sun's lobe falls, a table of 10 to 15 degrees cannot say. A smooth face bends its normal by a
+`texfunc`.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from numpy.typing import NDArray
 from transom.daylight.condition import Condition
 from transom.errors import InputError
 from transom.glass import NORMAL_REFLECTANCE, REFRACTIVE_INDEX, diffuse_reflectance, pane
-from transom.scene.model import Material, Opening, Scene
+from transom.scene.model import Material, Opening, ProductChoice, Scene
 from transom_reference.radiance_daylight import SKY_FILE, SKY_FUNCTIONS, daylight_description, numbers, watts
 from transom_reference.radiance_programs import make_octree
 
@@ -114,15 +116,25 @@ def _material(index: int, material: Material, openings: tuple[Opening, ...], ful
 
 
 def _pane(name: str, opening: Opening, full_physics: bool) -> str:
-    """Front: outdoors, black but for what passes. Back: the room side."""
+    """Front: outdoors, black but for what passes. Back: the room side. A product's front is turned to the room."""
     if opening.glazing == "none":
         return f"# {name}: {opening.name} is an unglazed hole"
+    if opening.product is not None:
+        return _bsdf(name, opening.product)
     room = 0.0 if full_physics else diffuse_reflectance(opening)
     mirror = "pane_mirror" if full_physics else "0"
     values = [0.0, 0.0, 0.0, room, room, room, 0.0, 0.0, 0.0, internal_transmittance(opening)]
     through = "pane_transmittance"
     functions = f"{mirror} {mirror} {mirror} {through} {through} {through} 0 0 0 {GLASS_FILE}"
     return f"void BRTDfunc {name}\n10 {functions}\n0\n{len(values)} {numbers(values)}"
+
+
+def _bsdf(name: str, product: ProductChoice) -> str:
+    """Radiance's own BSDF material, of the file itself; its front faces the room, its up is the steepest way up."""
+    if not product.name.lower().endswith(".xml"):
+        remedy = f"Write its table first: transom measure {product.name}, and glaze with the XML file"
+        raise InputError("is not a BSDF file that Radiance reads", field="product", value=product.name, remedy=remedy)
+    return f"void BSDF {name}\n6 0 {product.name} 0 0 1 .\n0\n0"
 
 
 def _faces(scene: Scene) -> Iterator[str]:
@@ -139,6 +151,8 @@ def _faces(scene: Scene) -> Iterator[str]:
         name, corners = f"material_{number}", mesh.vertices[row]
         if _area(corners) == 0:
             continue
+        if material.opening >= 0 and scene.openings[material.opening].product is not None:
+            corners = corners[::-1]
         if material.smooth and mesh.corner_normals is not None:
             choice = [0, 2, 3] if is_second[index] else [0, 1, 2]
             yield _bend(index, corners, mesh.corner_normals[face][choice], number)

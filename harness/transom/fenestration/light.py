@@ -89,7 +89,7 @@ def light_digest(scene: Scene, condition: Condition) -> str | None:
                 continue
             through = fenestration.sun(direction)
             _add(digest, through.residual)
-            for lobe in through.lobes:
+            for lobe in through.parallel_lobes:
                 _add(digest, lobe.direction, lobe.share)
     return digest.hexdigest()
 

@@ -34,7 +34,7 @@ class Expected:
 
 
 WRITTEN = (
-    Expected("cfs_references", "References of rooms with products, against each other", "transom lobes references"),
+    Expected("cfs_references", "References of rooms with products, against each other", "transom referees"),
     Expected(
         "cfs_representation", "Representation: lobes and residual against an independent ray set", "transom lobes"
     ),
