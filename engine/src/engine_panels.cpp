@@ -17,6 +17,7 @@ namespace transom {
 namespace {
 
 constexpr int kMaximumCycles = 20000;
+constexpr double kMostScale = 2;         // of sampled weights: beyond it too few rays have met a bin
 constexpr int kMaximumRounds = 16;       // of light between outdoors and the room through panels
 constexpr float kGrazingCosine = 1e-4f;  // of a lobe to its panel, from which on it carries nothing
 
@@ -53,6 +54,34 @@ void Engine::link_panels() {
     panel_patches_.append(to_patches(row.through));
   }
   panel_rows_.clear();
+  balance_panels();
+}
+
+// A room is closed: all that a panel sends into a bin arrives at patches. Their weights are scaled by bins until that
+// holds, as form factors are by rows.
+void Engine::balance_panels() {
+  const std::size_t first = static_cast<std::size_t>(sky_index_->count());
+  std::vector<double> arrived(static_cast<std::size_t>(panels_->bin_count()), 0.0);
+  for (std::size_t p = 0; p < patch_sky_.row_count(); ++p)
+    for (std::size_t k = patch_sky_.begin[p]; k < patch_sky_.begin[p + 1]; ++k) {
+      const Share& share = patch_sky_.entries[k];
+      if (static_cast<std::size_t>(share.index) >= first)
+        arrived[static_cast<std::size_t>(share.index) - first] += static_cast<double>(patch_area_[p] * share.weight);
+    }
+  std::vector<float> scale(arrived.size(), 1.f);
+  for (const Panel& panel : panels_->all()) {
+    const AngleBins& bins = panels_->frame(panel).bins;
+    const float area = faces_.faces[static_cast<std::size_t>(panel.face)].area;
+    for (int bin = 0; bin < bins.count(); ++bin) {
+      const auto number = static_cast<std::size_t>(panel.first_bin + bin);
+      const double sent = static_cast<double>(area * bins.projected_solid_angle(bin));
+      if (arrived[number] > 0)
+        scale[number] = static_cast<float>(std::clamp(sent / arrived[number], 1 / kMostScale, kMostScale));
+    }
+  }
+  for (Share& share : patch_sky_.entries)
+    if (static_cast<std::size_t>(share.index) >= first)
+      share.weight *= scale[static_cast<std::size_t>(share.index) - first];
 }
 
 void Engine::set_product(int opening, Product product) {

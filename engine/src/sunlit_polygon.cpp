@@ -98,7 +98,7 @@ std::vector<SunlitPiece> sunlit_pieces(const Faces& faces, const std::vector<Mat
   const Polygon panel = corners_of(face);
   const std::vector<Plane> sides = sides_along(panel, direction_to_sun);
   const double smallest = kSmallestPiece * static_cast<double>(face.area), margin = faces.ray_offset();
-  const Plane before{normal, -glm::dot(normal, panel[0]) - margin};
+  const Plane before{normal, -glm::dot(normal, panel[0])};
   std::vector<SunlitPiece> pieces{{panel, 1.f}};
   Polygon caster, behind;
   for (std::size_t f = 0; f < faces.faces.size() && !pieces.empty(); ++f) {
@@ -106,7 +106,7 @@ std::vector<SunlitPiece> sunlit_pieces(const Faces& faces, const std::vector<Mat
     const double cosine = glm::dot(glm::dvec3(other.normal), direction_to_sun);
     if (static_cast<int>(f) == face_index || std::abs(cosine) < kEdgeOnCosine) continue;
     caster = corners_of(other);
-    if (all_below(caster, before, 0) ||
+    if (all_below(caster, before, margin) ||
         std::any_of(sides.begin(), sides.end(), [&](const Plane& side) { return all_below(caster, side, 0); }))
       continue;
     Polygon front;

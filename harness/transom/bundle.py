@@ -36,6 +36,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from transom.daylight.condition import Condition
 from transom.errors import InputError
+from transom.fenestration.light import light_digest
 from transom.files import json_text, write_atomic
 from transom.images import read_exr, write_exr
 from transom.provenance import Provenance, current_provenance
@@ -123,6 +124,9 @@ class Case:
             "renderer_version": self.renderer_version,
             "options": {name: self.options[name] for name in sorted(self.options) if name not in EFFORT_OPTIONS},
         }
+        behind_products = light_digest(self.scene, self.condition)
+        if behind_products is not None:
+            identity["fenestration"] = behind_products
         if self.view is not None:
             view = self.view
             identity["view"] = {

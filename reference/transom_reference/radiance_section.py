@@ -26,7 +26,7 @@ ORDER_LIMITS = ("-lr", "-40", "-lw", "1e-6", "-ab", "6", "-ad", "200")
 
 
 def radiance_geometry(section: Section, periods: int = PERIODS) -> str:
-    """The section's lines as polygons that run along x, in a frame whose room side is just below z = 0, as genBSDF asks.
+    """The section's lines as polygons that run along x, in genBSDF's frame: the room side is just below z = 0.
 
     Interfaces with air become `dielectric`, which refracts, reflects and absorbs; mirrors become `metal`, diffuse lines
     `plastic`. Radiance averages the two polarisations at each surface. Raises InputError for gaps without width, holes
@@ -63,7 +63,7 @@ def _material(name: str, line: Line, media: tuple[tuple[float, float], ...]) -> 
     raise InputError("has no material in Radiance", field="kind", value=line.kind, remedy="Give gaps a width")
 
 
-def radiance_bsdf(section: Section, samples: int, processes: int = 1) -> Bsdf:
+def radiance_bsdf(section: Section, samples: int, periods: int = PERIODS) -> Bsdf:
     """The product's BSDF on the Klems full basis by genBSDF. samples: rays for each bin of leaving light."""
     os.environ["RAYPATH"] = f".:{radiance_folder() / 'lib'}"
     from pyradiance import genbsdf
@@ -73,10 +73,8 @@ def radiance_bsdf(section: Section, samples: int, processes: int = 1) -> Bsdf:
     box = genbsdf.SamplingBox(-side, side, 0.0, section.period_m, low - high - 2 * SLACK_M, 0.0)
     with tempfile.TemporaryDirectory() as folder:
         geometry = Path(folder) / "device.rad"
-        geometry.write_text(radiance_geometry(section))
-        found = genbsdf.generate_bsdf(
-            geometry, params=list(ORDER_LIMITS), nsamp=samples, nproc=processes, dim=box, basis="kf"
-        )
+        geometry.write_text(radiance_geometry(section, periods))
+        found = genbsdf.generate_bsdf(geometry, params=list(ORDER_LIMITS), nsamp=samples, dim=box, basis="kf")
         file = Path(folder) / "device.xml"
         file.write_bytes(genbsdf.generate_xml(vis_results=found, basis="kf"))
         return read_bsdf(file)

@@ -170,6 +170,7 @@ class Engine {
   std::uint32_t node_seed(const Node& node) const;
   void gather_panels();
   void link_panels();
+  void balance_panels();
   void solve_classic();
   std::shared_ptr<const Lighting> relight_classic(Condition condition, const Lighting* previous,
                                                   RelightFollower* follower) const;
