@@ -73,6 +73,8 @@ def with_other_product(scene: Scene, index: int) -> Scene:
 
 def _is_changeable(opening: Opening) -> bool:
     return opening.product is not None and not is_file(opening.product.name)
+
+
 def with_other_paint(scene: Scene, share: float) -> Scene:
     """The scene with the reflectance of its first opaque material multiplied by `share` (up to 1)."""
     index = next(index for index, material in enumerate(scene.materials) if material.opening < 0)
