@@ -143,7 +143,7 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
     }
     return true;
   };
-  if (!solve_with_panels(*lighting, after_cycle)) return nullptr;
+  if (!solve_with_panels(*lighting, after_cycle) || !is_wanted()) return nullptr;
   gather_indirect(*lighting, first_reflection);
   return lighting;
 }
