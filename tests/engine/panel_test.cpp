@@ -332,6 +332,33 @@ TEST(Panel, LightDoesNotDependOnThreads) {
   EXPECT_EQ(light(1), light(2));
 }
 
+TEST(Panel, RaysAndStencilVolumesShowTheSameLobes) {
+  SceneGeometry scene = south_room(0.5f);
+  add_quad(scene, {-20, -20, -0.01}, {20, -20, -0.01}, {20, 20, -0.01}, {-20, 20, -0.01}, 0);
+  add_quad(scene, {-9, -0.3, kHead}, {9, -0.3, kHead}, {9, 0, kHead}, {-9, 0, kHead}, 0);  // an overhang
+  add_box(scene, {1.8, 1.5, 0}, {2.2, 1.9, 2.2}, 0);                                       // a pillar in the light
+  const Engine engine(scene, test::tregenza(), quick_options());
+  Condition condition = dark();
+  for (const glm::vec3 direction : {glm::vec3(0, 1, 0.6f), glm::vec3(0.3f, 1, -0.5f), glm::vec3(0, -1, 0.6f)})
+    condition.beams.push_back(lobe(direction));
+  const auto lighting = engine.relight(condition);
+  FrameRenderer renderer(engine);
+  const View view{{0.4, 5.6, 1.2}, {2.2, 1, 1.6}, {0, 0, 1}, 1.4, 160, 120};
+  FrameOptions options;
+  options.edge_samples = 1;
+  const Frame rays = renderer.render(view, *lighting, options);
+  options.visibility = Visibility::kVolumes;
+  const Frame volumes = renderer.render(view, *lighting, options);
+  EXPECT_EQ(volumes.pass_count, 1 + 2 * 2);  // of the lobe that turns away: none
+  int lit = 0, different = 0;
+  for (std::size_t p = 0; p < rays.sun.size(); ++p) {
+    lit += rays.sun[p].y > 0;
+    different += std::abs(rays.sun[p].y - volumes.sun[p].y) > 1e-3f * rays.sun[p].y;
+  }
+  EXPECT_GT(lit, 800);
+  EXPECT_LE(different, 20);  // on edges
+}
+
 TEST(Panel, WrongProductsAreRefused) {
   Engine engine(south_room(0.5f), test::tregenza(), quick_options());
   EXPECT_THROW(engine.set_product(1, lambertian(0.5f)), InputError);
