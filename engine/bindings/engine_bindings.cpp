@@ -1,6 +1,7 @@
 // Python's view of the engine: arrays in, arrays out, nothing computed here.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -15,6 +16,7 @@
 #include "transom/error.h"
 #include "transom/frame.h"
 #include "transom/gl_context.h"
+#include "transom/relight_worker.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -52,9 +54,12 @@ struct Session {
   Engine engine;
   FrameRenderer renderer;
   std::shared_ptr<const Lighting> present = std::make_shared<const Lighting>();
-  std::shared_ptr<Lighting> in_steps;
   Sensors sensors;
-  const Lighting* previous() const { return present->shooting.unshot.empty() ? nullptr : present.get(); }
+  std::unique_ptr<RelightWorker> worker;  // while light is found beside other work; after the engine that it uses
+  std::pair<std::uint64_t, bool> take(RelightWorker::State state) {
+    if (state.number > 0) present = std::move(state.lighting);
+    return {state.number, state.number > 0 && present->is_final};
+  }
   Session(SceneGeometry scene, const SkyBins& bins, SolveOptions options)
       : engine(std::move(scene), bins, options), renderer(engine) {}
   Session(const Session& solved, SceneGeometry scene) : engine(solved.engine, std::move(scene)), renderer(engine) {}
@@ -192,10 +197,10 @@ NB_MODULE(_engine, m) {
       .def_ro("defects", &SolveFacts::defects)
       .def_ro("cluster_count", &SolveFacts::cluster_count)
       .def_ro("link_bytes", &SolveFacts::link_bytes)
-      .def_ro("panel_count", &SolveFacts::panel_count)
-      .def_ro("panel_bin_count", &SolveFacts::panel_bin_count)
       .def_ro("kept_patch_rows", &SolveFacts::kept_patch_rows)
-      .def_ro("kept_node_rows", &SolveFacts::kept_node_rows);
+      .def_ro("kept_node_rows", &SolveFacts::kept_node_rows)
+      .def_ro("panel_count", &SolveFacts::panel_count)
+      .def_ro("panel_bin_count", &SolveFacts::panel_bin_count);
 
   nb::class_<Condition>(m, "Condition")
       .def(
@@ -275,19 +280,23 @@ NB_MODULE(_engine, m) {
           "opening"_a, "transmission"_a, "room_reflectance"_a,
           "BTDF by bins [1/sr], row = exit bin, and room reflectance of an opening group's panels.")
       .def(
-          "relight", [](Session& s, const Condition& c) { s.present = s.engine.relight(c, s.previous()); },
+          "relight", [](Session& s, const Condition& c) { s.present = s.engine.relight(c, s.present.get()); },
           "condition"_a, nb::call_guard<nb::gil_scoped_release>())
       .def(
-          "begin_relight",
-          [](Session& s, const Condition& c) {
-            s.in_steps = std::make_shared<Lighting>(s.engine.begin_relight(c, s.previous()));
-            s.present = s.in_steps;
-          },
-          "condition"_a, nb::call_guard<nb::gil_scoped_release>(),
-          "Classic method: direct light at once, indirect light to follow.")
+          "start_worker", [](Session& s) { s.worker = std::make_unique<RelightWorker>(s.engine, s.present); },
+          nb::call_guard<nb::gil_scoped_release>(), "Begins to relight on a thread of its own.")
       .def(
-          "continue_relight", [](Session& s, int shots) { return s.engine.continue_relight(*s.in_steps, shots); },
-          "shots"_a, nb::call_guard<nb::gil_scoped_release>(), "Shoots at most so often; whether more is to come.")
+          "stop_worker", [](Session& s) { s.worker.reset(); }, nb::call_guard<nb::gil_scoped_release>())
+      .def(
+          "submit", [](Session& s, const Condition& c) { return s.worker->submit(c); }, "condition"_a,
+          nb::call_guard<nb::gil_scoped_release>(), "Gives the worker a condition; its number.")
+      .def(
+          "take_latest", [](Session& s) { return s.take(s.worker->latest()); },
+          nb::call_guard<nb::gil_scoped_release>(),
+          "Makes the worker's newest state the present light; number of its condition, and whether it is complete.")
+      .def(
+          "take_finished", [](Session& s) { return s.take(s.worker->finished()); },
+          nb::call_guard<nb::gil_scoped_release>(), "The same, once the newest condition is complete.")
       .def(
           "render",
           [](Session& s, const View& view, Visibility visibility, int edge_samples, bool components) {

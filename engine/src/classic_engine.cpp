@@ -1,6 +1,5 @@
 // The engine by the published method: what classic.h offers, put together.
 #include "transom/engine.h"
-#include "transom/error.h"
 #include "transom/sampling.h"
 
 namespace transom {
@@ -8,6 +7,8 @@ namespace {
 
 constexpr std::uint64_t kForwardStream = 0xc1a551c;
 constexpr double kShootingTolerance = 1e-3;  // flux in flight at which shooting stops, relative
+constexpr int kShotsBetweenStates = 64;
+constexpr int kAllShots = 1 << 20;
 
 }  // namespace
 
@@ -19,20 +20,18 @@ void Engine::solve_classic() {
   connects_emitters_ = false;
 }
 
-Lighting Engine::begin_relight(Condition condition, const Lighting* previous) const {
-  if (options_.method != Method::kClassic) throw InputError("only the classic method relights step by step");
-  condition.validate(sky_index_->count() - 1);
+// The direct light of a condition, with all indirect light of another still to be replaced.
+Lighting Engine::direct_classic(Condition condition, const Lighting* previous) const {
   Lighting lighting;
   lighting.condition = std::move(condition);
   const std::size_t n = slot_of_patch_.size();
   const int per_slot = mesh_->elements_per_slot();
   {
     const TracePhase phase(trace_, "forward rays");
-    std::vector<glm::vec3> residual;
-    find_shafts(lighting.condition, residual);
+    find_shafts(lighting.condition, lighting.panel_residual);
     lighting.patch_sun.assign(n, glm::vec3(0));
     lighting.patch_sky.assign(n, glm::vec3(0));
-    lighting.panel_radiance.assign(residual.size(), glm::vec3(0));
+    lighting.panel_radiance.assign(lighting.panel_residual.size(), glm::vec3(0));
     // What lies outdoors is lit without an opening; point sources light everything.
     std::vector<int> outdoors;
     for (std::size_t p = 0; p < n; ++p)
@@ -61,7 +60,7 @@ Lighting Engine::begin_relight(Condition condition, const Lighting* previous) co
       const auto p = static_cast<std::size_t>(patch_of_slot_[slot]);
       radiosity[p] = patch_emitted_[p] + patch_reflectance_[p] * (lighting.patch_sky[p] + lighting.patch_sun[p]);
     }
-    find_panel_radiance(residual, radiosity, lighting);
+    find_panel_radiance(radiosity, lighting);
     const ForwardLight light =
         forward_rays_->cast(lighting.condition, lighting.panel_radiance, *sky_index_, patch_of_slot_, patch_area_);
     lighting.forward_ray_count = light.ray_count;
@@ -72,19 +71,31 @@ Lighting Engine::begin_relight(Condition condition, const Lighting* previous) co
   }
   std::vector<glm::vec3> direct(n);
   for (std::size_t p = 0; p < n; ++p) direct[p] = lighting.patch_sun[p] + lighting.patch_sky[p];
-  lighting.shooting = previous ? previous->shooting : shooting_->dark();
+  const bool is_usable = previous && previous->shooting.unshot.size() == n;
+  lighting.shooting = is_usable ? previous->shooting : shooting_->dark();
   shooting_->replace_direct(lighting.shooting, direct);
   show_classic(lighting);
   return lighting;
 }
 
-bool Engine::continue_relight(Lighting& lighting, int shots) const {
-  if (options_.method != Method::kClassic) throw InputError("only the classic method relights step by step");
+std::shared_ptr<const Lighting> Engine::relight_classic(Condition condition, const Lighting* previous,
+                                                        RelightFollower* follower) const {
+  auto lighting = std::make_shared<Lighting>(direct_classic(std::move(condition), previous));
   const TracePhase phase(trace_, "shooting");
-  const int shot = shooting_->shoot(lighting.shooting, shots, kShootingTolerance);
-  lighting.shots += shot;
-  show_classic(lighting);
-  return shot == shots;
+  for (bool is_final = false; !is_final;) {
+    if (follower) {
+      if (!follower->is_wanted()) return nullptr;
+      lighting->is_final = false;
+      follower->show(std::make_shared<const Lighting>(*lighting));
+    }
+    const int shots = follower ? kShotsBetweenStates : kAllShots;
+    const int shot = shooting_->shoot(lighting->shooting, shots, kShootingTolerance);
+    lighting->shots += shot;
+    is_final = shot < shots;
+    if (is_final || follower) show_classic(*lighting);
+  }
+  lighting->is_final = true;
+  return lighting;
 }
 
 // Hands the present state to all that shows or measures light.

@@ -13,14 +13,14 @@ namespace {
 
 constexpr int kSamplesPerElement = 4;          // of a beam
 constexpr int kTellingSamples = 2;             // of these, the ones that say whether an element is partly lit
-constexpr int kRefinedSamplesPerElement = 16;  // at the edges of light
+constexpr int kRefinedSamplesPerElement = 32;  // at the edges of light
 constexpr int kSourceSamplesPerElement = 16;   // of point sources
 constexpr float kSameShare = 1e-3f;            // of a beam, between samples of an evenly lit element
 constexpr std::size_t kGrain = 4;
 constexpr std::uint32_t kRaysPerSmallOpening = 256;
 constexpr float kGrazingCosine = 1e-3f;  // below it a small opening lets nothing through
 constexpr std::uint32_t kPatternCount = 64;
-constexpr std::uint32_t kPatternPoints = 16;
+constexpr std::uint32_t kPatternPoints = 32;
 static_assert(kPatternPoints >= kRefinedSamplesPerElement && kPatternPoints >= kSourceSamplesPerElement);
 
 }  // namespace
@@ -73,8 +73,7 @@ DirectLight::DirectLight(const LightMesh& mesh, const RayScene& rays, const std:
     sources_.push_back({glm::vec3(source.position - mesh.faces().origin), source.intensity});
 }
 
-void DirectLight::beam_transmission(const Beam& beam, std::span<const glm::vec3> points,
-                                    std::span<float> share) const {
+void DirectLight::beam_transmission(const Beam& beam, std::span<const glm::vec3> points, std::span<float> share) const {
   if (beam.opening >= 0) {
     shaft_transmission(beam, points, share);
     return;
@@ -144,46 +143,90 @@ std::vector<glm::vec3> DirectLight::points_on(int slot_index, const Corners& cor
   return points;
 }
 
-// Whether the samples of an element, or of one beside it, differ. Elements of triangles ask all of their patch.
-bool DirectLight::is_partly_lit(int slot_index, int element, std::span<const float> share) const {
-  const int edge = static_cast<int>(std::lround(std::sqrt(static_cast<float>(mesh_.elements_per_slot())))),
-            x = element % edge, y = element / edge;
-  const bool is_quad = mesh_.grid(mesh_.slot(slot_index).face).is_quad;
-  const float own = share[static_cast<std::size_t>(element * kSamplesPerElement)];
-  for (int e = 0; e < mesh_.elements_per_slot(); ++e) {
-    if (is_quad && (std::abs(e % edge - x) > 1 || std::abs(e / edge - y) > 1)) continue;
-    for (int i = 0; i < kTellingSamples; ++i)
-      if (std::abs(share[static_cast<std::size_t>(e * kSamplesPerElement + i)] - own) > kSameShare) return true;
-  }
-  return false;
+// The few samples that every element of the candidates has: share of a beam, kSamplesPerElement an element.
+std::vector<float> DirectLight::sample_sun(const Beam& sun, const Receivers& receivers,
+                                           const std::vector<std::size_t>& candidates, const Patterns& patterns) const {
+  std::vector<int> elements(static_cast<std::size_t>(mesh_.elements_per_slot()));
+  std::iota(elements.begin(), elements.end(), 0);
+  const std::size_t samples_per_slot = elements.size() * kSamplesPerElement;
+  std::vector<float> share(candidates.size() * samples_per_slot);
+  parallel_indices(candidates.size(), kGrain, [&](std::size_t k) {
+    const std::size_t i = candidates[k];
+    const std::vector<glm::vec3> points =
+        points_on(receivers.slots[i], receivers.corners[i], elements, kSamplesPerElement, patterns);
+    const std::span<float> of_slot(&share[k * samples_per_slot], samples_per_slot);
+    beam_transmission(sun, points, of_slot);
+    ignore_small_openings(sun.direction_to_source, points, of_slot);
+  });
+  return share;
 }
 
-// Mean share of a beam on each element of a slot. Few samples tell elements that are wholly lit or dark from those at
-// the edges of light, which are sampled densely.
-void DirectLight::sun_on_slot(const Beam& sun, int slot_index, const Corners& corners, const Patterns& patterns,
-                              std::vector<float>& mean) const {
-  const int element_count = mesh_.elements_per_slot();
-  std::vector<int> elements(static_cast<std::size_t>(element_count));
-  std::iota(elements.begin(), elements.end(), 0);
-  std::vector<float> share(static_cast<std::size_t>(element_count * kSamplesPerElement));
-  std::vector<glm::vec3> points = points_on(slot_index, corners, elements, kSamplesPerElement, patterns);
-  beam_transmission(sun, points, share);
-  ignore_small_openings(sun.direction_to_source, points, share);
-  mean.resize(static_cast<std::size_t>(element_count));
-  for (int e = 0; e < element_count; ++e)
-    mean[e] = std::accumulate(&share[e * kSamplesPerElement + kTellingSamples],
-                              &share[e * kSamplesPerElement] + kSamplesPerElement, 0.f) /
-              static_cast<float>(kSamplesPerElement - kTellingSamples);
-  std::erase_if(elements, [&](int e) { return !is_partly_lit(slot_index, e, share); });
-  if (elements.empty()) return;
-  std::vector<float> refined(elements.size() * kRefinedSamplesPerElement);
-  points = points_on(slot_index, corners, elements, kRefinedSamplesPerElement, patterns);
-  beam_transmission(sun, points, refined);
-  ignore_small_openings(sun.direction_to_source, points, refined);
-  for (std::size_t k = 0; k < elements.size(); ++k)
-    mean[elements[k]] = std::accumulate(&refined[k * kRefinedSamplesPerElement],
-                                        &refined[k * kRefinedSamplesPerElement] + kRefinedSamplesPerElement, 0.f) /
-                        kRefinedSamplesPerElement;
+// The elements of a slot whose telling samples differ from each other or from those of an element beside them, in the
+// same face. Patches without samples are dark. In triangles, the elements of a patch are all beside each other.
+std::vector<int> DirectLight::partly_lit(int slot_index, const std::vector<int>& place_of_slot,
+                                         const std::vector<float>& share) const {
+  const Slot slot = mesh_.slot(slot_index);
+  const Grid& grid = mesh_.grid(slot.face);
+  const int per_slot = mesh_.elements_per_slot(),
+            edge = static_cast<int>(std::lround(std::sqrt(static_cast<float>(per_slot))));
+  const auto sample = [&](int of_slot, int element, int i) {
+    const int place = place_of_slot[of_slot];
+    return place < 0 ? 0.f : share[static_cast<std::size_t>((place * per_slot + element) * kSamplesPerElement + i)];
+  };
+  std::vector<int> found;
+  for (int e = 0; e < per_slot; ++e) {
+    const float own = sample(slot_index, e, 0);
+    bool differs = false;
+    const auto compare = [&](int of_slot, int element) {
+      for (int i = 0; i < kTellingSamples; ++i) differs |= std::abs(sample(of_slot, element, i) - own) > kSameShare;
+    };
+    if (!grid.is_quad) {
+      for (int other = 0; other < per_slot; ++other) compare(slot_index, other);
+    } else {
+      const int x = slot.cell % grid.u_count * edge + e % edge, y = slot.cell / grid.u_count * edge + e / edge;
+      for (int v = std::max(0, y - 1); v <= std::min(grid.v_count * edge - 1, y + 1); ++v)
+        for (int u = std::max(0, x - 1); u <= std::min(grid.u_count * edge - 1, x + 1); ++u)
+          compare(mesh_.slot_index(slot.face, slot.side, v / edge * grid.u_count + u / edge),
+                  v % edge * edge + u % edge);
+    }
+    if (differs) found.push_back(e);
+  }
+  return found;
+}
+
+// Adds the sun to the light of elements, by receiver. Elements at the edges of light, as two samples of each tell, are
+// sampled densely; the others keep two samples that did not tell: then the thin shadows that none of them found are, in
+// the mean, made up for.
+void DirectLight::add_sun(const Beam& sun, const Receivers& receivers, const Patterns& patterns,
+                          std::vector<std::vector<glm::vec3>>& sum) const {
+  const std::vector<std::size_t> candidates = reached(sun.direction_to_source, receivers);
+  const std::vector<float> share = sample_sun(sun, receivers, candidates, patterns);
+  std::vector<int> place_of_slot(static_cast<std::size_t>(mesh_.slot_count()), -1);
+  for (std::size_t k = 0; k < candidates.size(); ++k)
+    place_of_slot[receivers.slots[candidates[k]]] = static_cast<int>(k);
+  const int per_slot = mesh_.elements_per_slot();
+  parallel_indices(candidates.size(), kGrain, [&](std::size_t k) {
+    const std::size_t i = candidates[k];
+    const glm::vec3 full = sun.normal_illuminance * glm::dot(sun.direction_to_source, receivers.normals[i]);
+    const float* own = &share[k * static_cast<std::size_t>(per_slot * kSamplesPerElement)];
+    std::vector<float> mean(static_cast<std::size_t>(per_slot));
+    for (int e = 0; e < per_slot; ++e)
+      mean[e] =
+          std::accumulate(own + e * kSamplesPerElement + kTellingSamples, own + (e + 1) * kSamplesPerElement, 0.f) /
+          static_cast<float>(kSamplesPerElement - kTellingSamples);
+    const std::vector<int> elements = partly_lit(receivers.slots[i], place_of_slot, share);
+    std::vector<float> refined(elements.size() * kRefinedSamplesPerElement);
+    const std::vector<glm::vec3> points =
+        points_on(receivers.slots[i], receivers.corners[i], elements, kRefinedSamplesPerElement, patterns);
+    beam_transmission(sun, points, refined);
+    ignore_small_openings(sun.direction_to_source, points, refined);
+    for (std::size_t n = 0; n < elements.size(); ++n)
+      mean[elements[n]] = std::accumulate(&refined[n * kRefinedSamplesPerElement],
+                                          &refined[n * kRefinedSamplesPerElement] + kRefinedSamplesPerElement, 0.f) /
+                          kRefinedSamplesPerElement;
+    sum[i].resize(static_cast<std::size_t>(per_slot), glm::vec3(0));
+    for (int e = 0; e < per_slot; ++e) sum[i][e] += mean[e] * full;
+  });
 }
 
 void DirectLight::sources_on_slot(int slot_index, const Corners& corners, glm::vec3 normal, const Patterns& patterns,
@@ -196,33 +239,24 @@ void DirectLight::sources_on_slot(int slot_index, const Corners& corners, glm::v
         point_source_illuminance(points[i], normal) / static_cast<float>(kSourceSamplesPerElement);
 }
 
-std::vector<std::vector<char>> DirectLight::reach(const std::vector<Beam>& beams, const Receivers& receivers) const {
-  std::vector<std::vector<char>> reached(beams.size(), std::vector<char>(receivers.slots.size(), 0));
-  for (std::size_t b = 0; b < beams.size(); ++b) {
-    if (beams[b].normal_illuminance == glm::vec3(0)) continue;
-    if (beams[b].opening >= 0) {
-      reached[b] = reach_of_lobe(beams[b], receivers);
-      continue;
-    }
-    const glm::vec3 direction = beams[b].direction_to_source;
-    const BeamOutlines outlines(mesh_.faces(), large_openings_, direction);
-    int known_face = -1;
-    std::vector<int> passages;  // over that face
-    for (std::size_t i = 0; i < receivers.slots.size(); ++i) {
-      if (glm::dot(direction, receivers.normals[i]) <= 0) continue;
-      if (!receivers.is_behind_openings[i]) {
-        reached[b][i] = 1;
-        continue;
-      }
+// The receivers that a beam may reach.
+std::vector<std::size_t> DirectLight::reached(glm::vec3 direction, const Receivers& receivers) const {
+  std::vector<std::size_t> found;
+  const BeamOutlines outlines(mesh_.faces(), large_openings_, direction);
+  int known_face = -1;
+  std::vector<int> passages;  // over that face
+  for (std::size_t i = 0; i < receivers.slots.size(); ++i) {
+    if (glm::dot(direction, receivers.normals[i]) <= 0) continue;
+    if (receivers.is_behind_openings[i]) {
       const int f = mesh_.slot(receivers.slots[i]).face;
       const Face& face = mesh_.faces().faces[f];
       if (f != known_face) outlines.covering(outlines.outline({face.corner, face.is_quad ? 4u : 3u}), passages);
       known_face = f;
-      if (passages.empty()) continue;
-      reached[b][i] = outlines.is_covered(outlines.outline(receivers.corners[i]), passages);
+      if (passages.empty() || !outlines.is_covered(outlines.outline(receivers.corners[i]), passages)) continue;
     }
+    found.push_back(i);
   }
-  return reached;
+  return found;
 }
 
 // Takes the light away that comes to the points through a small opening first.
@@ -283,43 +317,29 @@ std::vector<LitElement> DirectLight::deposit(const std::vector<Beam>& beams, con
                                              std::uint32_t seed) const {
   std::vector<LitElement> lit;
   if (beams.empty() && sources_.empty()) return lit;
-  const std::vector<std::vector<char>> reached = reach(beams, receivers);
-  const std::map<int, glm::vec3> sent = send_through_small_openings(beams, seed);
-  const int per_slot = mesh_.elements_per_slot();
-  const auto is_sent = [&](int slot) {
-    const auto entry = sent.lower_bound(slot * per_slot);
-    return entry != sent.end() && entry->first < (slot + 1) * per_slot;
-  };
-  std::vector<std::size_t> candidates;
-  for (std::size_t i = 0; i < receivers.slots.size(); ++i)
-    if (!sources_.empty() || is_sent(receivers.slots[i]) ||
-        std::any_of(reached.begin(), reached.end(), [i](const std::vector<char>& by_beam) { return by_beam[i] != 0; }))
-      candidates.push_back(i);
   const Patterns patterns(seed);
-  std::vector<std::vector<glm::vec3>> sum(candidates.size());
-  parallel_indices(candidates.size(), kGrain, [&](std::size_t k) {
-    const int slot_index = receivers.slots[candidates[k]];
-    const Corners& corners = receivers.corners[candidates[k]];
-    const glm::vec3 normal = receivers.normals[candidates[k]];
-    sum[k].assign(static_cast<std::size_t>(per_slot), glm::vec3(0));
-    std::vector<float> mean;
-    for (std::size_t b = 0; b < beams.size(); ++b) {
-      if (!reached[b][candidates[k]]) continue;
-      const float cosine = glm::dot(beams[b].direction_to_source, normal);
-      if (beams[b].opening < 0)
-        sun_on_slot(beams[b], slot_index, corners, patterns, mean);
-      else
-        lobe_on_slot(beams[b], slot_index, seed, mean);
-      for (int e = 0; e < per_slot; ++e) sum[k][e] += beams[b].normal_illuminance * (cosine * mean[e]);
-    }
-    if (!sources_.empty()) sources_on_slot(slot_index, corners, normal, patterns, sum[k]);
-    for (auto entry = sent.lower_bound(slot_index * per_slot);
-         entry != sent.end() && entry->first < (slot_index + 1) * per_slot; ++entry)
-      sum[k][entry->first % per_slot] += entry->second;
-  });
-  for (std::size_t k = 0; k < candidates.size(); ++k)
-    for (int e = 0; e < per_slot; ++e)
-      if (sum[k][e] != glm::vec3(0)) lit.push_back({receivers.slots[candidates[k]] * per_slot + e, sum[k][e]});
+  const int per_slot = mesh_.elements_per_slot();
+  std::vector<std::vector<glm::vec3>> sum(receivers.slots.size());  // by element, or empty
+  for (const Beam& beam : beams) {
+    if (beam.normal_illuminance == glm::vec3(0)) continue;
+    if (beam.opening < 0)
+      add_sun(beam, receivers, patterns, sum);
+    else
+      add_lobe(beam, receivers, seed, sum);
+  }
+  const std::map<int, glm::vec3> sent = send_through_small_openings(beams, seed);
+  if (!sources_.empty() || !sent.empty())
+    parallel_indices(receivers.slots.size(), kGrain, [&](std::size_t i) {
+      sum[i].resize(static_cast<std::size_t>(per_slot), glm::vec3(0));
+      if (!sources_.empty())
+        sources_on_slot(receivers.slots[i], receivers.corners[i], receivers.normals[i], patterns, sum[i]);
+      const int first = receivers.slots[i] * per_slot;
+      for (auto entry = sent.lower_bound(first); entry != sent.end() && entry->first < first + per_slot; ++entry)
+        sum[i][entry->first - first] += entry->second;
+    });
+  for (std::size_t i = 0; i < receivers.slots.size(); ++i)
+    for (std::size_t e = 0; e < sum[i].size(); ++e)
+      if (sum[i][e] != glm::vec3(0)) lit.push_back({receivers.slots[i] * per_slot + static_cast<int>(e), sum[i][e]});
   return lit;
 }
 

@@ -5,11 +5,13 @@
 
 #include "transom/deposit.h"
 #include "transom/first_bounce.h"
+#include "transom/parallel.h"
 #include "transom/sampling.h"
 
 namespace transom {
 namespace {
 
+constexpr std::size_t kGrain = 4;
 constexpr std::uint32_t kRaysPerPart = 4;          // to a part of an element, to find out whether all of it is lit
 constexpr std::uint32_t kRefinedRaysPerPart = 32;  // where some of it is
 
@@ -68,17 +70,33 @@ void DirectLight::shaft_transmission(const Beam& lobe, std::span<const glm::vec3
 }
 
 // Receivers whose corners' box a shaft may meet, on the side that faces the lobe.
-std::vector<char> DirectLight::reach_of_lobe(const Beam& lobe, const Receivers& receivers) const {
-  std::vector<char> reached(receivers.slots.size(), 0);
-  for (std::size_t i = 0; i < reached.size() && !lobe.shafts->empty(); ++i) {
+std::vector<std::size_t> DirectLight::reached_by_lobe(const Beam& lobe, const Receivers& receivers) const {
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < receivers.slots.size() && !lobe.shafts->empty(); ++i) {
     if (glm::dot(lobe.direction_to_source, receivers.normals[i]) <= 0) continue;
     const Corners& corner = receivers.corners[i];
     const glm::vec3 low = glm::min(glm::min(corner[0], corner[1]), glm::min(corner[2], corner[3]));
     const glm::vec3 high = glm::max(glm::max(corner[0], corner[1]), glm::max(corner[2], corner[3]));
-    reached[i] = std::any_of(lobe.shafts->begin(), lobe.shafts->end(),
-                             [&](const LightShaft& shaft) { return shaft.may_meet(low, high); });
+    if (std::any_of(lobe.shafts->begin(), lobe.shafts->end(),
+                    [&](const LightShaft& shaft) { return shaft.may_meet(low, high); }))
+      found.push_back(i);
   }
-  return reached;
+  return found;
+}
+
+// Adds a lobe to the light of elements, by receiver.
+void DirectLight::add_lobe(const Beam& lobe, const Receivers& receivers, std::uint32_t seed,
+                           std::vector<std::vector<glm::vec3>>& sum) const {
+  const std::vector<std::size_t> candidates = reached_by_lobe(lobe, receivers);
+  const auto per_slot = static_cast<std::size_t>(mesh_.elements_per_slot());
+  parallel_indices(candidates.size(), kGrain, [&](std::size_t k) {
+    const std::size_t i = candidates[k];
+    std::vector<float> mean;
+    lobe_on_slot(lobe, receivers.slots[i], seed, mean);
+    const glm::vec3 full = lobe.normal_illuminance * glm::dot(lobe.direction_to_source, receivers.normals[i]);
+    sum[i].resize(per_slot, glm::vec3(0));
+    for (std::size_t e = 0; e < per_slot; ++e) sum[i][e] += mean[e] * full;
+  });
 }
 
 // Mean share of a lobe on each element of a slot.

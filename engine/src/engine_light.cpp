@@ -12,7 +12,7 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr int kMaximumCycles = 20000;
-constexpr int kShotsAtOnce = 1 << 20;
+constexpr int kShownCycle = 2;  // of interreflection: about 3 % of the flux is still to come
 
 }  // namespace
 
@@ -34,7 +34,7 @@ glm::vec3 Engine::sky_light(const Lighting& lighting, const SparseRows& rows, st
 }
 
 // What points are connected to for the light that falls on elements.
-std::vector<BrightElement> Engine::bright_elements(const std::vector<LitElement>& lit) const {
+std::vector<BrightElement> Engine::bright_elements(std::span<const LitElement> lit) const {
   std::vector<BrightElement> bright;
   for (const LitElement& e : lit) {
     const glm::vec3 rho = patch_reflectance_[patch_of_slot_[e.element / mesh_->elements_per_slot()]];
@@ -43,60 +43,109 @@ std::vector<BrightElement> Engine::bright_elements(const std::vector<LitElement>
   return bright;
 }
 
-std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Lighting* previous) const {
-  if (options_.method == Method::kClassic) {
-    const auto classic = std::make_shared<Lighting>(begin_relight(std::move(condition), previous));
-    while (continue_relight(*classic, kShotsAtOnce)) {
-    }
-    return classic;
-  }
-  condition.validate(sky_index_->count() - 1);
-  const auto result = std::make_shared<Lighting>();
-  Lighting& lighting = *result;
+// Light that has not been reflected: of beams and point sources on elements, of the sky on patches and at nodes.
+Lighting Engine::direct_light_of(Condition condition) const {
+  Lighting lighting;
   lighting.condition = std::move(condition);
-  std::vector<glm::vec3> residual;
-  find_shafts(lighting.condition, residual);
-  const std::size_t n = slot_of_patch_.size();
-  const int per_slot = mesh_->elements_per_slot();
-  std::vector<LitElement>& lit = lighting.lit_elements;
+  find_shafts(lighting.condition, lighting.panel_residual);
   {
     const TracePhase phase(trace_, "beams");
-    lit = beam_light_->deposit(lighting.condition.beams, receivers_, hash_seed(options_.seed, kBeamStream));
-    lighting.bright_elements = bright_elements(lit);
+    lighting.lit_elements =
+        beam_light_->deposit(lighting.condition.beams, receivers_, hash_seed(options_.seed, kBeamStream));
+    lighting.beam_lit_count = lighting.lit_elements.size();
+    lighting.lit_elements.insert(lighting.lit_elements.end(), lit_by_sources_.begin(), lit_by_sources_.end());
+    lighting.bright_elements = bright_elements({lighting.lit_elements.data(), lighting.beam_lit_count});
+    lighting.beam_bright_count = lighting.bright_elements.size();
+    lighting.bright_elements.insert(lighting.bright_elements.end(), bright_always_.begin(), bright_always_.end());
+    lighting.patch_sun.assign(slot_of_patch_.size(), glm::vec3(0));
+    const int per_slot = mesh_->elements_per_slot();
+    for (const LitElement& e : lighting.lit_elements) {
+      const int patch = patch_of_slot_[e.element / per_slot];
+      lighting.patch_sun[patch] += e.illuminance * element_share_[patch * per_slot + e.element % per_slot];
+    }
   }
-  std::vector<glm::vec3>& sun = lighting.patch_sun;
-  sun.assign(n, glm::vec3(0));
-  const std::size_t node_count = node_sky_.row_count();
-  lighting.node_indirect = node_always_;
+  find_panel_radiance({}, lighting);
+  find_sky_light(lighting);
+  return lighting;
+}
+
+// Light of the sky, the ground and panels on patches and at nodes.
+void Engine::find_sky_light(Lighting& lighting) const {
+  const TracePhase phase(trace_, "sky");
+  lighting.patch_sky.resize(patch_sky_.row_count());
+  lighting.node_sky.resize(node_sky_.row_count());
+  parallel_indices(lighting.patch_sky.size(), 64,
+                   [&](std::size_t p) { lighting.patch_sky[p] = sky_light(lighting, patch_sky_, p); });
+  parallel_indices(lighting.node_sky.size(), 64,
+                   [&](std::size_t i) { lighting.node_sky[i] = sky_light(lighting, node_sky_, i); });
+}
+
+// The first state of a relighting: its own direct light, and the indirect light of another, or none.
+std::shared_ptr<const Lighting> Engine::with_indirect_of(Lighting lighting, const Lighting* previous) const {
+  const bool is_usable = previous && previous->patch_irradiance.size() == lighting.patch_sky.size() &&
+                         previous->node_indirect.size() == lighting.node_sky.size();
+  lighting.is_final = false;
+  lighting.node_indirect = is_usable ? previous->node_indirect : node_always_;
+  lighting.patch_irradiance.resize(lighting.patch_sky.size());
+  for (std::size_t p = 0; p < lighting.patch_irradiance.size(); ++p) {
+    lighting.patch_irradiance[p] = lighting.patch_sky[p] + lighting.patch_sun[p];
+    if (is_usable)
+      lighting.patch_irradiance[p] += previous->patch_irradiance[p] - previous->patch_sky[p] - previous->patch_sun[p];
+  }
+  find_smooth_radiosity(lighting);
+  return std::make_shared<const Lighting>(std::move(lighting));
+}
+
+void Engine::find_smooth_radiosity(Lighting& lighting) const {
+  const std::size_t n = slot_of_patch_.size();
+  lighting.patch_smooth_radiosity.resize(n);
+  for (std::size_t p = 0; p < n; ++p)
+    lighting.patch_smooth_radiosity[p] = (connects_emitters_ ? glm::vec3(0) : patch_emitted_[p]) +
+                                         patch_reflectance_[p] * (lighting.patch_irradiance[p] - lighting.patch_sun[p]);
+}
+
+// Indirect light at nodes, from the irradiance of patches.
+void Engine::gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& first_reflection) const {
+  const TracePhase phase(trace_, "gather");
+  find_smooth_radiosity(lighting);
+  std::vector<glm::vec4> radiosity(slot_of_patch_.size());
+  for (std::size_t p = 0; p < radiosity.size(); ++p) radiosity[p] = glm::vec4(lighting.patch_smooth_radiosity[p], 0);
+  lighting.node_indirect.resize(first_reflection.size());
+  parallel_indices(first_reflection.size(), 64, [&](std::size_t i) {
+    lighting.node_indirect[i] =
+        first_reflection[i] + glm::vec3(node_rows_->patches.dot(i, radiosity) + node_through_.dot(i, radiosity));
+  });
+}
+
+std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Lighting* previous,
+                                                RelightFollower* follower) const {
+  check(condition);
+  if (options_.method == Method::kClassic) return relight_classic(std::move(condition), previous, follower);
+  const auto is_wanted = [follower] { return !follower || follower->is_wanted(); };
+  const auto lighting = std::make_shared<Lighting>(direct_light_of(std::move(condition)));
+  if (!is_wanted()) return nullptr;
+  if (follower) follower->show(with_indirect_of(*lighting, previous));
+  std::vector<glm::vec3> first_reflection = node_always_;
   {
     const TracePhase phase(trace_, "first reflection");
-    links_->add_irradiance(lighting.bright_elements, lighting.node_indirect);
+    links_->add_irradiance({lighting->bright_elements.data(), lighting->beam_bright_count}, first_reflection);
   }
-  lit.insert(lit.end(), lit_by_sources_.begin(), lit_by_sources_.end());
-  lighting.bright_elements.insert(lighting.bright_elements.end(), bright_always_.begin(), bright_always_.end());
-  {
-    const TracePhase phase(trace_, "interreflection");
-    for (const LitElement& e : lit) {
-      const int patch = patch_of_slot_[e.element / per_slot];
-      sun[patch] += e.illuminance * element_share_[patch * per_slot + e.element % per_slot];
+  if (!is_wanted()) return nullptr;
+  // A state on the way once most of the indirect light is there; later cycles change what an eye does not see.
+  const auto after_cycle = [&](int cycle, const std::vector<glm::vec3>& irradiance) {
+    if (!is_wanted()) return false;
+    if (follower && cycle == kShownCycle) {
+      const auto state = std::make_shared<Lighting>(*lighting);
+      state->is_final = false;
+      state->patch_irradiance = irradiance;
+      gather_indirect(*state, first_reflection);
+      follower->show(state);
     }
-    solve_with_panels(residual, lighting);
-    lighting.patch_smooth_radiosity.resize(n);
-    for (std::size_t p = 0; p < n; ++p)
-      lighting.patch_smooth_radiosity[p] = (connects_emitters_ ? glm::vec3(0) : patch_emitted_[p]) +
-                                           patch_reflectance_[p] * (lighting.patch_irradiance[p] - sun[p]);
-  }
-  {
-    const TracePhase phase(trace_, "gather");
-    lighting.node_sky.resize(node_count);
-    std::vector<glm::vec4> radiosity(n);
-    for (std::size_t p = 0; p < n; ++p) radiosity[p] = glm::vec4(lighting.patch_smooth_radiosity[p], 0);
-    parallel_indices(node_count, 64, [&](std::size_t i) {
-      lighting.node_sky[i] = sky_light(lighting, node_sky_, i);
-      lighting.node_indirect[i] += glm::vec3(node_rows_->patches.dot(i, radiosity) + node_through_.dot(i, radiosity));
-    });
-  }
-  return result;
+    return true;
+  };
+  if (!solve_with_panels(*lighting, after_cycle)) return nullptr;
+  gather_indirect(*lighting, first_reflection);
+  return lighting;
 }
 
 // By patch * elements_per_slot + element [lx].

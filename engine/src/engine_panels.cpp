@@ -125,7 +125,8 @@ void Engine::find_shafts(Condition& condition, std::vector<glm::vec3>& residual)
     const bool is_dark = beam.normal_illuminance == glm::vec3(0);
     for (const Panel& panel : panels_->all()) {
       if (panel.opening != beam.opening || is_dark) continue;
-      const glm::dvec3 normal(faces_.faces[static_cast<std::size_t>(panel.face)].normal), back(beam.direction_to_source);
+      const glm::dvec3 normal(faces_.faces[static_cast<std::size_t>(panel.face)].normal),
+          back(beam.direction_to_source);
       if (!(glm::dot(normal, back) > kGrazingCosine)) continue;  // it turns away from the room
       for (const SunlitPiece& piece : pieces_at(panel.face, beam.direction_to_sun))
         shafts->push_back(light_shaft(piece, normal, back));
@@ -137,7 +138,8 @@ void Engine::find_shafts(Condition& condition, std::vector<glm::vec3>& residual)
     if (!has_panel(scene_, rest.opening)) fail(rest.opening, "a residual needs panels");
     const int bins = scene_.openings[static_cast<std::size_t>(rest.opening)].panel->bins.count();
     if (static_cast<int>(rest.radiance.size()) != bins)
-      fail(rest.opening, "a residual has " + std::to_string(rest.radiance.size()) + " bins, not " + std::to_string(bins));
+      fail(rest.opening,
+           "a residual has " + std::to_string(rest.radiance.size()) + " bins, not " + std::to_string(bins));
     for (const Panel& panel : panels_->all()) {
       if (panel.opening != rest.opening) continue;
       const double share = sunlit_share(faces_.faces[static_cast<std::size_t>(panel.face)],
@@ -151,11 +153,10 @@ void Engine::find_shafts(Condition& condition, std::vector<glm::vec3>& residual)
 
 // L_o = residual + T (D s + D_outdoors B). radiosity: of patches [lm/m²], or empty. Returns the change of the flux that
 // panels send out, as a share of it.
-double Engine::find_panel_radiance(const std::vector<glm::vec3>& residual, const std::vector<glm::vec3>& radiosity,
-                                   Lighting& lighting) const {
+double Engine::find_panel_radiance(const std::vector<glm::vec3>& radiosity, Lighting& lighting) const {
   const std::vector<glm::vec3> before = std::move(lighting.panel_radiance);
-  lighting.panel_radiance = residual;
-  std::vector<glm::vec3> arriving(residual.size());
+  lighting.panel_radiance = lighting.panel_residual;
+  std::vector<glm::vec3> arriving(lighting.panel_residual.size());
   parallel_indices(arriving.size(), 16, [&](std::size_t i) {
     arriving[i] = sky_light(lighting, panel_sky_, i);
     if (!radiosity.empty()) arriving[i] += panel_patches_.dot(i, radiosity);
@@ -179,27 +180,26 @@ double Engine::find_panel_radiance(const std::vector<glm::vec3>& residual, const
   return total > 0 ? change / total : 0;
 }
 
-// Light of sky and panels on patches, and interreflection. What outdoor surfaces send through panels depends on light
-// that is only known afterwards: found again until it no longer changes.
-void Engine::solve_with_panels(const std::vector<glm::vec3>& residual, Lighting& lighting) const {
+// Interreflection. What outdoor surfaces send through panels depends on light that is only known afterwards: found
+// again until it no longer changes. False where `after_cycle` has ended it.
+bool Engine::solve_with_panels(Lighting& lighting, const Interreflection::AfterCycle& after_cycle) const {
+  const TracePhase phase(trace_, "interreflection");
   const std::size_t n = slot_of_patch_.size();
   std::vector<glm::vec3> direct(n), radiosity;
-  lighting.patch_sky.resize(n);
-  lighting.sweeps = 0;
-  find_panel_radiance(residual, radiosity, lighting);
   for (int round = 0; round < kMaximumRounds; ++round) {
-    parallel_indices(n, 64, [&](std::size_t p) {
-      lighting.patch_sky[p] = sky_light(lighting, patch_sky_, p);
-      direct[p] = lighting.patch_sky[p] + lighting.patch_sun[p];
-    });
-    lighting.sweeps +=
-        interreflection_->solve(patch_emitted_, direct, options_.tolerance, kMaximumCycles, lighting.patch_irradiance);
-    if (panel_patches_.entries.empty()) return;
+    for (std::size_t p = 0; p < n; ++p) direct[p] = lighting.patch_sky[p] + lighting.patch_sun[p];
+    const int cycles = interreflection_->solve(patch_emitted_, direct, options_.tolerance, kMaximumCycles,
+                                               lighting.patch_irradiance, after_cycle);
+    if (cycles == 0) return false;
+    lighting.sweeps += cycles;
+    if (panel_patches_.entries.empty()) return true;
     radiosity.resize(n);
     for (std::size_t p = 0; p < n; ++p)
       radiosity[p] = patch_emitted_[p] + patch_reflectance_[p] * lighting.patch_irradiance[p];
-    if (find_panel_radiance(residual, radiosity, lighting) <= options_.tolerance) return;
+    if (find_panel_radiance(radiosity, lighting) <= options_.tolerance) return true;
+    find_sky_light(lighting);
   }
+  return true;
 }
 
 }  // namespace transom

@@ -100,7 +100,8 @@ void Interreflection::find_operators() {
 }
 
 int Interreflection::solve(const std::vector<glm::vec3>& emitted, const std::vector<glm::vec3>& direct,
-                           double tolerance, int maximum_cycles, std::vector<glm::vec3>& irradiance) const {
+                           double tolerance, int maximum_cycles, std::vector<glm::vec3>& irradiance,
+                           const AfterCycle& after_cycle) const {
   const std::size_t n = areas_.size(), m = static_cast<std::size_t>(cluster_count_);
   std::vector<glm::vec4> radiosity(n), next(n);
   for (std::size_t i = 0; i < n; ++i) radiosity[i] = glm::vec4(emitted[i] + reflectance_[i] * direct[i], 0);
@@ -120,6 +121,7 @@ int Interreflection::solve(const std::vector<glm::vec3>& emitted, const std::vec
       total += areas_[i] * (next[i].x + next[i].y + next[i].z);
     }
     if (!(change > tolerance * total)) return cycle;
+    if (after_cycle && !after_cycle(cycle, irradiance)) return 0;
     for (std::size_t c = 0; c < m; ++c) left[c] /= std::max(cluster_area_[c], 1e-30f);
     parallel_indices(m, 32, [&](std::size_t c) {
       glm::vec4 sum(0);

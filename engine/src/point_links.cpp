@@ -261,7 +261,7 @@ std::vector<std::shared_ptr<const PointLinks::Link>> PointLinks::links_of(const 
   return found;
 }
 
-PointLinks::LitPatch PointLinks::lit_patch(const std::vector<BrightElement>& bright, std::size_t first,
+PointLinks::LitPatch PointLinks::lit_patch(std::span<const BrightElement> bright, std::size_t first,
                                            std::size_t last) const {
   const int per_slot = mesh_.elements_per_slot(), slot_index = bright[first].element / per_slot;
   const Slot slot = mesh_.slot(slot_index);
@@ -283,7 +283,7 @@ PointLinks::LitPatch PointLinks::lit_patch(const std::vector<BrightElement>& bri
   return patch;
 }
 
-void PointLinks::add_irradiance(const std::vector<BrightElement>& bright, std::vector<glm::vec3>& irradiance) const {
+void PointLinks::add_irradiance(std::span<const BrightElement> bright, std::vector<glm::vec3>& irradiance) const {
   const int per_slot = mesh_.elements_per_slot();
   std::vector<int> slots;
   for (const BrightElement& b : bright)

@@ -163,24 +163,20 @@ class Engine:
                 fenestration.room_reflectance(),
             )
 
-    def relight_in_steps(self, condition: Condition, shots: int = 64) -> Iterator[float]:
-        """Classic method: new direct light at once, then the old indirect light replaced, `shots` patches at a time.
+    @contextmanager
+    def relighting(self) -> Iterator[Relighting]:
+        """A `with` block in which light is found on a thread of its own while this one draws.
 
-        Yields the share of flux still in flight; after each, `render` and `illuminance` show a usable state. Left
-        early, the next relighting goes on from there. Raises InputError for another method.
+        with engine.relighting() as relighting:
+            relighting.begin(condition)
+            while not relighting.take():
+                show(engine.render(view))
         """
-        if self.options.method != "classic":
-            remedy = 'Solve with method "classic"'
-            raise InputError("cannot relight in steps", field="method", value=self.options.method, remedy=remedy)
-        core_condition = self._core_condition(condition)
-        with self._input_errors(condition):
-            self._core.begin_relight(core_condition)
-        self.condition = condition
-        more = True
-        while more:
-            yield float(self._core.unshot_share)
-            more = self._core.continue_relight(shots)
-        yield float(self._core.unshot_share)
+        self._core.start_worker()
+        try:
+            yield Relighting(self)
+        finally:
+            self._core.stop_worker()
 
     @contextmanager
     def _input_errors(self, condition: Condition) -> Iterator[None]:
@@ -269,9 +265,9 @@ class Engine:
             "leak_share": facts.leak_share,
             "clusters": facts.cluster_count,
             "link_bytes": facts.link_bytes,
+            "kept": {"patch_rows": facts.kept_patch_rows, "node_rows": facts.kept_node_rows},
             "panels": facts.panel_count,
             "panel_bins": facts.panel_bin_count,
-            "kept": {"patch_rows": facts.kept_patch_rows, "node_rows": facts.kept_node_rows},
             "form_factor_defects": {
                 "raw_reciprocity": defects.raw_reciprocity,
                 "raw_row_sum": defects.raw_row_sum,
@@ -308,6 +304,41 @@ class Engine:
     def _require_light(self) -> None:
         if self.condition is None:
             raise RuntimeError("relight the engine before looking at it")
+
+
+class Relighting:
+    """Light that is being found beside other work. Made by `Engine.relighting`; used by the thread that draws."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self._begun: dict[int, Condition] = {}
+
+    def begin(self, condition: Condition) -> None:
+        """Asks for the light of a condition and returns at once; one that is still in work is abandoned.
+
+        Raises InputError for light that is negative or not finite; what is in work then goes on.
+        """
+        core_condition = self._engine._core_condition(condition)
+        with self._engine._input_errors(condition):
+            number = self._engine._core.submit(core_condition)
+        self._begun[number] = condition
+
+    def take(self) -> bool:
+        """Makes the newest state the engine's present light; whether it is the complete light of the newest condition.
+
+        The first state of a condition has its beams and sky, with the indirect light of the one before it.
+        """
+        return self._taken(*self._engine._core.take_latest())
+
+    def finish(self) -> None:
+        """Waits for the complete light of the newest condition, and makes it the engine's present light."""
+        self._taken(*self._engine._core.take_finished())
+
+    def _taken(self, number: int, is_complete: bool) -> bool:
+        if number in self._begun:
+            self._engine.condition = self._begun[number]
+            self._begun = {n: condition for n, condition in self._begun.items() if n >= number}
+        return is_complete and number == max(self._begun, default=0)
 
 
 def trace_primary(scene: Scene, view: View) -> tuple[NDArray[np.int32], Float32, NDArray[np.bool_]]:

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include <numbers>
 
 #include "rooms.h"
@@ -121,35 +123,20 @@ TEST(Classic, AgreesWithTheGatheringMethodInTheMean) {
   EXPECT_NEAR((audit.absorbed + audit.out).y / audit.in().y, 1, 5e-3);
 }
 
-TEST(Classic, StepsLeadToTheAnswerOfOneRelighting) {
-  Condition condition = uniform_sky(5000);
+TEST(Classic, EachStateHasLessFluxInFlight) {
+  struct Shares : RelightFollower {
+    std::vector<double> unshot;
+    void show(std::shared_ptr<const Lighting> state) override { unshot.push_back(state->unshot_share); }
+    bool is_wanted() const override { return true; }
+  } shares;
   const Engine engine(roof_light_room(0.6f), tregenza(), classic_options());
-  const auto whole = engine.relight(condition);
-  Lighting interrupted = engine.begin_relight(uniform_sky(100), nullptr);
-  engine.continue_relight(interrupted, 5);
-  Lighting stepped = engine.begin_relight(condition, &interrupted);
-  double before = stepped.unshot_share;
-  int steps = 0;
-  while (engine.continue_relight(stepped, 50)) {
-    EXPECT_LT(stepped.unshot_share, before);
-    before = stepped.unshot_share;
-    ++steps;
-  }
-  EXPECT_GT(steps, 2);
-  for (std::size_t p = 0; p < whole->patch_irradiance.size(); ++p) {
-    const float truth = whole->patch_irradiance[p].y;
-    EXPECT_NEAR(stepped.patch_irradiance[p].y, truth, 0.01f * truth + 1);
-  }
-}
-
-TEST(Classic, OtherMethodsDoNotRelightInSteps) {
-  SolveOptions options = classic_options();
-  options.method = Method::kGather;
-  options.target_patch_count = 100;
-  Engine engine(roof_light_room(0.5f), tregenza(), options);
-  Lighting lighting;
-  EXPECT_THROW(engine.begin_relight(uniform_sky(1), nullptr), InputError);
-  EXPECT_THROW(engine.continue_relight(lighting, 1), InputError);
+  const auto light = engine.relight(uniform_sky(5000), nullptr, &shares);
+  EXPECT_GT(shares.unshot.size(), 2u);
+  shares.unshot.push_back(light->unshot_share);
+  EXPECT_TRUE(std::is_sorted(shares.unshot.rbegin(), shares.unshot.rend()));
+  const auto at_once = engine.relight(uniform_sky(5000));
+  for (std::size_t p = 0; p < light->patch_irradiance.size(); ++p)
+    EXPECT_NEAR(light->patch_irradiance[p].y, at_once->patch_irradiance[p].y, 0.01f * at_once->patch_irradiance[p].y);
 }
 
 }  // namespace

@@ -1,4 +1,6 @@
-"""The published method from Python: it relights in steps, and its means are those of the default method."""
+"""The published method from Python, and light that is found beside the drawing, by either method."""
+
+import dataclasses
 
 import numpy as np
 import pytest
@@ -39,15 +41,40 @@ def test_an_interrupted_relighting_ends_in_the_light_of_the_newest_condition(eng
     old, new = (resolve_condition(spec, scene.site) for spec in scene.conditions[:2])
     classic.relight(new)
     fresh = classic.audit().absorbed
-    steps = classic.relight_in_steps(old, shots=16)
-    assert next(steps) > next(steps) > 0  # left early
-    shares = list(classic.relight_in_steps(new, shots=64))
-    assert shares == sorted(shares, reverse=True)
+    with classic.relighting() as relighting:
+        relighting.begin(old)
+        relighting.begin(new)  # replaces the old one, whatever was done of it
+        relighting.finish()
+    assert classic.condition is new
     assert classic.forward_rays > 100_000
     np.testing.assert_allclose(classic.audit().absorbed, fresh, rtol=5e-3)
 
 
-def test_the_default_method_does_not_relight_in_steps(engines: tuple[Engine, Engine]) -> None:
+def test_light_found_beside_the_drawing_is_that_of_a_relighting(engines: tuple[Engine, Engine]) -> None:
     _, gather = engines
-    with pytest.raises(InputError, match="method"):
-        next(gather.relight_in_steps(resolve_condition(gather.scene.conditions[0], gather.scene.site)))
+    scene = gather.scene
+    conditions = [resolve_condition(spec, scene.site) for spec in scene.conditions[:3]]
+    view = dataclasses.replace(scene.views[0], width=32, height=24)
+    with gather.relighting() as relighting:
+        for condition in conditions:
+            relighting.begin(condition)
+            if relighting.take():
+                gather.render(view)
+        while not relighting.take():
+            gather.render(view)
+        beside = gather.render(view).radiance
+    assert gather.condition is conditions[-1]
+    gather.relight(conditions[-1])
+    np.testing.assert_array_equal(beside, gather.render(view).radiance)
+
+
+def test_a_condition_that_cannot_be_is_refused_and_what_is_in_work_goes_on(engines: tuple[Engine, Engine]) -> None:
+    _, gather = engines
+    good = resolve_condition(gather.scene.conditions[0], gather.scene.site)
+    bad = dataclasses.replace(good, ground_luminance_rgb=np.array([-1.0, 0.0, 0.0]))
+    with gather.relighting() as relighting:
+        relighting.begin(good)
+        with pytest.raises(InputError):
+            relighting.begin(bad)
+        relighting.finish()
+    assert gather.condition is good

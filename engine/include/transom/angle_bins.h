@@ -40,6 +40,7 @@ struct PanelFrame {
   AngleBins bins;
 
   bool operator==(const PanelFrame&) const = default;
+
   glm::vec3 to_panel(glm::vec3 direction) const {
     return {glm::dot(direction, x), glm::dot(direction, y), glm::dot(direction, z)};
   }

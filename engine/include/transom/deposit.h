@@ -64,13 +64,16 @@ class DirectLight {
   using Corners = std::array<glm::vec3, 4>;
   std::vector<glm::vec3> points_on(int slot, const Corners& corners, std::span<const int> elements, int samples,
                                    const Patterns& patterns) const;
-  /// Which receivers each beam may reach.
-  std::vector<std::vector<char>> reach(const std::vector<Beam>& beams, const Receivers& receivers) const;
-  std::vector<char> reach_of_lobe(const Beam& lobe, const Receivers& receivers) const;
-  bool is_partly_lit(int slot, int element, std::span<const float> share) const;
-  void sun_on_slot(const Beam& sun, int slot, const Corners& corners, const Patterns& patterns,
-                   std::vector<float>& mean) const;
+  std::vector<std::size_t> reached(glm::vec3 direction, const Receivers& receivers) const;
+  std::vector<float> sample_sun(const Beam& sun, const Receivers& receivers, const std::vector<std::size_t>& candidates,
+                                const Patterns& patterns) const;
+  std::vector<int> partly_lit(int slot, const std::vector<int>& place_of_slot, const std::vector<float>& share) const;
+  void add_sun(const Beam& sun, const Receivers& receivers, const Patterns& patterns,
+               std::vector<std::vector<glm::vec3>>& sum) const;
+  std::vector<std::size_t> reached_by_lobe(const Beam& lobe, const Receivers& receivers) const;
   void lobe_on_slot(const Beam& lobe, int slot, std::uint32_t seed, std::vector<float>& mean) const;
+  void add_lobe(const Beam& lobe, const Receivers& receivers, std::uint32_t seed,
+                std::vector<std::vector<glm::vec3>>& sum) const;
   void shaft_transmission(const Beam& lobe, std::span<const glm::vec3> points, std::span<float> share) const;
   void sources_on_slot(int slot, const Corners& corners, glm::vec3 normal, const Patterns& patterns,
                        std::vector<glm::vec3>& sum) const;

@@ -3,6 +3,7 @@
 
 #include <glm/glm.hpp>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -49,7 +50,7 @@ struct SolveFacts {
   float maximum_edge_m = 0;
   double leak_share = 0;  ///< of the hemisphere rays of interior patches, those that met nothing
   TransferDefects defects;
-  int cluster_count = 0;                        ///< of patches, for interreflection
+  int cluster_count = 0;  ///< of patches, for interreflection
   int panel_count = 0, panel_bin_count = 0;
   std::size_t link_bytes = 0;                   ///< of what is kept of how nodes see patches
   int kept_patch_rows = 0, kept_node_rows = 0;  ///< taken over from another engine, but for what lies behind openings
@@ -80,16 +81,16 @@ class Engine {
   Engine(const Engine& solved, SceneGeometry scene);
   ~Engine();
 
-  /// The light of a condition: everything but the image. Any number of threads may ask at once.
-  /// previous: kClassic alone replaces its light step by step, so that the answer depends on it within the tolerance of
-  /// shooting; null: from darkness.
-  std::shared_ptr<const Lighting> relight(Condition condition, const Lighting* previous = nullptr) const;
+  /// The light of a condition: everything but the image. Any number of threads may ask at once. Throws InputError for
+  /// light that is negative or not finite.
+  /// previous: light whose indirect part the first states show; kClassic starts from it and replaces it step by step,
+  /// so that its answer depends on it within the tolerance of shooting. Null: from darkness. follower: takes the states
+  /// on the way; null: none. The answer is null where it has abandoned the relighting.
+  std::shared_ptr<const Lighting> relight(Condition condition, const Lighting* previous = nullptr,
+                                          RelightFollower* follower = nullptr) const;
 
-  /// kClassic: relights step by step. The direct light is that of the new condition at once; `continue_relight` shoots
-  /// at most `shots` times, replaces the old condition's indirect light by as much, and says whether more is to come.
-  /// Throws InputError for another method.
-  Lighting begin_relight(Condition condition, const Lighting* previous) const;
-  bool continue_relight(Lighting& lighting, int shots) const;
+  /// Throws InputError for a condition that `relight` would refuse.
+  void check(const Condition& condition) const { condition.validate(sky_index_->count() - 1); }
 
   /// Puts a product into the panels of an opening group; until then nothing passes them. No light that was found before
   /// changes. Throws InputError for a group without panels, a matrix of the wrong size or values that cannot be. Not
@@ -171,18 +172,25 @@ class Engine {
   void link_panels();
   void balance_panels();
   void solve_classic();
+  std::shared_ptr<const Lighting> relight_classic(Condition condition, const Lighting* previous,
+                                                  RelightFollower* follower) const;
+  Lighting direct_classic(Condition condition, const Lighting* previous) const;
   void show_classic(Lighting& lighting) const;
   std::vector<Share> to_slots(std::vector<Share> elements) const;
   std::vector<Share> patches_at(const std::vector<Share>& slots) const;
+  Lighting direct_light_of(Condition condition) const;
+  std::shared_ptr<const Lighting> with_indirect_of(Lighting lighting, const Lighting* previous) const;
+  void find_smooth_radiosity(Lighting& lighting) const;
+  void gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& first_reflection) const;
   std::vector<Share> to_patches(const std::vector<Share>& elements) const;
   glm::vec3 sky_light(const Lighting& lighting, const SparseRows& rows, std::size_t row) const;
   void find_shafts(Condition& condition, std::vector<glm::vec3>& residual) const;
-  double find_panel_radiance(const std::vector<glm::vec3>& residual, const std::vector<glm::vec3>& radiosity,
-                             Lighting& lighting) const;
-  void solve_with_panels(const std::vector<glm::vec3>& residual, Lighting& lighting) const;
+  double find_panel_radiance(const std::vector<glm::vec3>& radiosity, Lighting& lighting) const;
+  void find_sky_light(Lighting& lighting) const;
+  bool solve_with_panels(Lighting& lighting, const Interreflection::AfterCycle& after_cycle) const;
   void light_always();
   std::vector<int> beam_slots() const;
-  std::vector<BrightElement> bright_elements(const std::vector<LitElement>& lit) const;
+  std::vector<BrightElement> bright_elements(std::span<const LitElement> lit) const;
   std::vector<glm::vec3> element_direct(const Lighting& lighting) const;
   glm::dvec3 through_product(const Panel& panel, const std::vector<glm::dvec3>& arriving) const;
 

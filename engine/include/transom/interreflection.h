@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/glm.hpp>
 #include <vector>
 
@@ -24,10 +25,13 @@ class Interreflection {
   Interreflection(const SparseRows& form_factors, const SparseRows& through, std::vector<glm::vec3> reflectance,
                   std::vector<float> areas, const std::vector<PatchPlace>& places);
 
+  /// Sees the irradiance after each cycle but the last; false ends the solution.
+  using AfterCycle = std::function<bool(int cycle, const std::vector<glm::vec3>& irradiance)>;
+
   /// Irradiance of each patch. Returns the number of cycles until the change of reflected flux is below `tolerance` of
-  /// all flux; throws std::runtime_error when `maximum_cycles` do not suffice.
+  /// all flux, or 0 where `after_cycle` has ended it; throws std::runtime_error when `maximum_cycles` do not suffice.
   int solve(const std::vector<glm::vec3>& emitted, const std::vector<glm::vec3>& direct, double tolerance,
-            int maximum_cycles, std::vector<glm::vec3>& irradiance) const;
+            int maximum_cycles, std::vector<glm::vec3>& irradiance, const AfterCycle& after_cycle = {}) const;
 
   /// Replaces the reflectance of one patch. What clusters carry stays as it was prepared: it costs cycles, not accuracy.
   void set_reflectance(std::size_t patch, glm::vec3 reflectance) { reflectance_[patch] = reflectance; }

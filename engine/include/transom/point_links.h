@@ -5,6 +5,7 @@
 #include <glm/glm.hpp>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <vector>
 
 #include "transom/first_bounce.h"
@@ -35,7 +36,7 @@ class PointLinks {
 
   /// Adds to the irradiance of every point [lx] what the bright elements send to it; elements of one slot stand
   /// together. Links what has not been linked. Threads may ask at once.
-  void add_irradiance(const std::vector<BrightElement>& bright, std::vector<glm::vec3>& irradiance) const;
+  void add_irradiance(std::span<const BrightElement> bright, std::vector<glm::vec3>& irradiance) const;
 
   /// Memory held by links [bytes].
   std::size_t byte_count() const;
@@ -69,7 +70,7 @@ class PointLinks {
   std::shared_ptr<const Link> link(int slot, const Known& known) const;
   void link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points, const KnownPoints& known) const;
   void link_near(Link& link, int slot, glm::vec3 normal, const KnownPoints& known) const;
-  LitPatch lit_patch(const std::vector<BrightElement>& bright, std::size_t first, std::size_t last) const;
+  LitPatch lit_patch(std::span<const BrightElement> bright, std::size_t first, std::size_t last) const;
 
   const LightMesh& mesh_;
   const RayScene& rays_;
