@@ -72,14 +72,42 @@ void FrameRenderer::find_shares(const Beam& beam, std::span<const BeamPoint> poi
   for (std::size_t k = 0; k < facing.size(); ++k) shares[facing[k]] = found[k];
 }
 
+std::vector<FrameRenderer::Box> FrameRenderer::boxes_of(const std::vector<BeamPoint>& points) const {
+  std::vector<Box> boxes((points.size() + kBlock - 1) / kBlock);
+  parallel_indices(boxes.size(), 16, [&](std::size_t b) {
+    Box box{glm::vec3(Ray::kInfinity), glm::vec3(-Ray::kInfinity)};
+    for (std::size_t k = b * kBlock; k < std::min(points.size(), (b + 1) * kBlock); ++k) {
+      if (points[k].surface < 0) continue;
+      box.low = glm::min(box.low, points[k].position);
+      box.high = glm::max(box.high, points[k].position);
+    }
+    boxes[b] = box;
+  });
+  return boxes;
+}
+
+// Shares of all points; blocks that no shaft of a lobe can meet are passed over.
+void FrameRenderer::find_shares_by_block(const Beam& beam, const std::vector<BeamPoint>& points,
+                                         const std::vector<Box>& boxes, const std::vector<float>* mask_share,
+                                         const Masks& masks, std::vector<float>& shares) const {
+  shares.resize(points.size());
+  parallel_indices(boxes.size(), 1, [&](std::size_t b) {
+    const std::size_t begin = b * kBlock, size = std::min(kBlock, points.size() - begin);
+    const bool may_be_lit =
+        beam.opening < 0 || std::any_of(beam.shafts->begin(), beam.shafts->end(),
+                                        [&](const auto& s) { return s.may_meet(boxes[b].low, boxes[b].high); });
+    if (may_be_lit)
+      find_shares(beam, {&points[begin], size}, mask_share, masks, {&shares[begin], size});
+    else
+      std::fill(&shares[begin], &shares[begin] + size, 0.f);
+  });
+}
+
 void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const std::vector<float>* mask_share,
                              const Masks& masks, std::vector<glm::vec3>& picture, std::vector<char>& is_edge) const {
   const int width = samples.view.width, height = samples.view.height, s = samples.edge_samples;
-  const std::size_t pixel_count = samples.centre.size();
-  std::vector<float> share(pixel_count);
-  parallel_ranges(pixel_count, kBlock, [&](std::size_t begin, std::size_t end) {
-    find_shares(beam, {&samples.centre[begin], end - begin}, mask_share, masks, {&share[begin], end - begin});
-  });
+  std::vector<float> share;
+  find_shares_by_block(beam, samples.centre, centre_boxes_, mask_share, masks, share);
   const auto reflected = [&](const BeamPoint& point, float of_beam) {
     return of_beam * point.weight * glm::dot(point.normal, beam.direction_to_source) / kPi *
            engine_.reflectance(point.surface / 2, point.surface % 2) * beam.normal_illuminance;
@@ -93,6 +121,10 @@ void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const
     std::vector<BeamPoint> points;
     std::vector<float> shares;
     const int y = static_cast<int>(row);
+    // By rays nothing happens where neither the row nor its neighbours are lit.
+    const auto first = share.begin() + std::max(y - 1, 0) * width,
+               last = share.begin() + std::min(y + 2, height) * width;
+    if (!mask_share && std::all_of(first, last, [](float of_beam) { return of_beam == 0; })) return;
     for (int x = 0; x < width; ++x) {
       const int pixel = y * width + x;
       const BeamPoint& centre = samples.centre[pixel];
@@ -131,10 +163,8 @@ void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const
   // Pixels with an edge of a surface, and panes: every sample for itself. Neither depends on the other's order.
   for (const std::vector<BeamPoint>* points : {&samples.fine, &samples.on_panes}) {
     const std::vector<float>* shares_by_mask = points == &samples.fine ? mask_share : nullptr;
-    share.resize(points->size());
-    parallel_ranges(points->size(), kBlock, [&](std::size_t begin, std::size_t end) {
-      find_shares(beam, {&(*points)[begin], end - begin}, shares_by_mask, masks, {&share[begin], end - begin});
-    });
+    const std::vector<Box>& boxes = points == &samples.fine ? fine_boxes_ : pane_boxes_;
+    find_shares_by_block(beam, *points, boxes, shares_by_mask, masks, share);
     for (std::size_t k = 0; k < points->size(); ++k)
       if (share[k] > 0) picture[(*points)[k].pixel] += reflected((*points)[k], share[k]);
   }
@@ -173,6 +203,9 @@ Frame FrameRenderer::render(const View& view, const Lighting& lighting, FrameOpt
     const TracePhase samples_phase(engine_.trace(), "view");
     samples_.reset();
     samples_ = std::make_unique<ViewSamples>(engine_, view, options.edge_samples);
+    centre_boxes_ = boxes_of(samples_->centre);
+    fine_boxes_ = boxes_of(samples_->fine);
+    pane_boxes_ = boxes_of(samples_->on_panes);
   }
   const ViewSamples& samples = *samples_;
   const Condition& condition = lighting.condition;

@@ -162,8 +162,7 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
     if (blocked[i] || segments[i].t_far <= 0) continue;
     if (const Panel* panel = panels_.at(candidates[i].face)) {
       if (glm::dot(segments[i].direction, mesh_.faces().faces[panel->face].normal) > 0)
-        row.sky.push_back(
-            {sky_.count() + panels_.bin(*panel, -segments[i].direction), scale * candidates[i].weight});
+        row.sky.push_back({sky_.count() + panels_.bin(*panel, -segments[i].direction), scale * candidates[i].weight});
       continue;
     }
     segments[kept] = segments[i];
@@ -203,7 +202,8 @@ GatherRow Gatherer::surroundings_of_point(const Node& point, GatherSamples sampl
 void Gatherer::look_through_openings(const Node& point, GatherSamples samples, std::uint32_t seed,
                                      GatherRow& row) const {
   const Origin origin{point.position, point.normal};
-  gather_openings(origin, [&](glm::vec2) { return origin; }, samples.openings, seed, row);
+  gather_openings(
+      origin, [&](glm::vec2) { return origin; }, samples.openings, seed, row);
   merge_shares(row.through);
   merge_shares(row.sky);
 }

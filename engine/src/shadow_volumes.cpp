@@ -273,14 +273,12 @@ void ShadowVolumes::Impl::draw_visible_depth(const VolumeCamera& camera) {
 
 /// False when no visible surface can lie in the light that comes through the opening: the light misses the picture's
 /// pyramid, or every surface is on the sun's side of the opening.
-bool ShadowVolumes::Impl::light_reaches_picture(std::span<const glm::vec3> corners,
-                                                glm::dvec3 direction_to_sun) const {
+bool ShadowVolumes::Impl::light_reaches_picture(std::span<const glm::vec3> corners, glm::dvec3 direction_to_sun) const {
   const glm::dmat4 rows = glm::transpose(clip_from_world_);
   for (const glm::dvec4& plane : {rows[3] + rows[0], rows[3] - rows[0], rows[3] + rows[1], rows[3] - rows[1]}) {
     const bool is_outside = glm::dot(glm::dvec3(plane), -direction_to_sun) <= 0 &&
-                            std::all_of(corners.begin(), corners.end(), [&](glm::vec3 corner) {
-                              return glm::dot(plane, glm::dvec4(corner, 1)) < 0;
-                            });
+                            std::all_of(corners.begin(), corners.end(),
+                                        [&](glm::vec3 corner) { return glm::dot(plane, glm::dvec4(corner, 1)) < 0; });
     if (is_outside) return false;
   }
   const auto height = [&](std::uint32_t v) { return glm::dot(glm::dvec3(vertices_[v]), direction_to_sun); };
@@ -379,7 +377,8 @@ std::vector<std::uint8_t> ShadowVolumes::Impl::count(const VolumeCamera& camera,
   const glm::dvec3 source = begin(camera, direction_to_source);
   const VolumeTriangles volume = casters.volume(source, static_cast<std::uint32_t>(vertices.size()));
   if (volume.empty() || !light_reaches_picture(vertices, source))
-    return std::vector<std::uint8_t>(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height), 0);
+    return std::vector<std::uint8_t>(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height),
+                                     0);
   upload(other_array_, other_buffer_, vertices, source, GL_STREAM_DRAW);
   std::vector<std::uint8_t> counted = count_crossings(volume);
   check_errors();

@@ -1,9 +1,9 @@
 // Panels of glazing products against closed forms, clear glass and another visibility method.
 #include <gtest/gtest.h>
 
+#include <oneapi/tbb/global_control.h>
 #include <cmath>
 #include <numbers>
-#include <oneapi/tbb/global_control.h>
 
 #include "rooms.h"
 #include "transom/angle_bins.h"
@@ -21,9 +21,9 @@ using test::add_quad;
 using test::diffuse;
 
 constexpr float kPi = std::numbers::pi_v<float>;
-constexpr double kWidth = 4, kDepth = 6, kHeight = 3;                    // of the room, x, y, z
-constexpr double kLeft = 1, kRight = 3, kSill = 1, kHead = 2;            // of the panel, in the wall y = 0
-const glm::vec3 kSun = glm::normalize(glm::vec3(0.3f, -1.f, 0.8f));     // towards it
+constexpr double kWidth = 4, kDepth = 6, kHeight = 3;                // of the room, x, y, z
+constexpr double kLeft = 1, kRight = 3, kSill = 1, kHead = 2;        // of the panel, in the wall y = 0
+const glm::vec3 kSun = glm::normalize(glm::vec3(0.3f, -1.f, 0.8f));  // towards it
 const glm::vec3 kInto(0, 1, 0);
 
 AngleBins klems() {

@@ -1,8 +1,8 @@
 /// @file Pictures: primary rays, light between nodes, beams per pixel, edges averaged over the pixel.
 #pragma once
 
-#include <glm/glm.hpp>
 #include <deque>
+#include <glm/glm.hpp>
 #include <memory>
 #include <span>
 #include <utility>
@@ -58,6 +58,13 @@ class FrameRenderer {
 
  private:
   class Masks;
+  /// What bounds a block of beam points.
+  struct Box {
+    glm::vec3 low{0}, high{0};
+  };
+  std::vector<Box> boxes_of(const std::vector<BeamPoint>& points) const;
+  void find_shares_by_block(const Beam& beam, const std::vector<BeamPoint>& points, const std::vector<Box>& boxes,
+                            const std::vector<float>* mask_share, const Masks& masks, std::vector<float>& shares) const;
   struct VolumeGroup {
     int opening;
     glm::vec3 normal;
@@ -74,6 +81,7 @@ class FrameRenderer {
 
   const Engine& engine_;
   std::unique_ptr<ViewSamples> samples_;  // of the last camera
+  std::vector<Box> centre_boxes_, fine_boxes_, pane_boxes_;
   std::unique_ptr<GlContext> context_;
   std::unique_ptr<ShadowVolumes> volumes_;
   std::vector<VolumeGroup> volume_groups_;  // openings of one kind and orientation, as the stencil counts them

@@ -74,8 +74,8 @@ class ShadowVolumes {
   std::vector<std::uint8_t> count(const VolumeCamera& camera, glm::dvec3 direction_to_source,
                                   const VolumeCasters& casters);
 
-  /// Passes of the last render or count: one for visible surfaces unless the camera is the previous one, one for opaque casters,
-  /// one for each opening group whose light can be in the picture.
+  /// Passes of the last render or count: one for visible surfaces unless the camera is the previous one, one for opaque
+  /// casters, one for each opening group whose light can be in the picture.
   int pass_count() const;
 
  private:
