@@ -66,11 +66,16 @@ class SolveOptions:
 
 @dataclass(frozen=True)
 class Frame:
-    """A picture (height, width, 3), linear RGB whose Y is cd/m², and its parts, which add up to it."""
+    """A picture (height, width, 3), linear RGB whose Y is cd/m², and its parts, which add up to it.
+
+    pass_count: passes of the stencil volumes; 0 by rays. 1 + 2 for each beam and plane of openings, less those that
+    carry nothing.
+    """
 
     radiance: Float32
     components: Mapping[str, Float32]
     edge_pixel_count: int
+    pass_count: int = 0
 
 
 @dataclass(frozen=True)
@@ -223,7 +228,7 @@ class Engine:
         except _engine.EngineInputError as error:
             raise InputError(str(error), file=self.scene.file, field=f"views.{view.name}") from None
         names = ("sun", "sky", "indirect", "emitted", "exterior") if components else ()
-        return Frame(result["radiance"], {name: result[name] for name in names}, result["edge_pixel_count"])
+        return Frame(result["radiance"], {name: result[name] for name in names}, result["edge_pixel_count"], result["pass_count"])
 
     def illuminance(
         self, points: Float64, normals: Float64, *, rays: int = 16384, opening_rays: int = 8192
@@ -285,6 +290,13 @@ class Engine:
     def trace(self) -> list[tuple[str, float, float]]:
         """Phases recorded so far as (name, begin, end) [s]; empty unless solved with trace=True."""
         return list(self._core.trace)
+
+    @property
+    def lobe_count(self) -> int:
+        """Lobes of products in the present condition, over all panel groups that the sun shines on."""
+        if self.condition is None:
+            return 0
+        return sum(len(light.beams) for light in panel_light(self.scene, self.condition))
 
     @property
     def sweeps(self) -> int:

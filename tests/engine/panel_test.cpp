@@ -278,6 +278,32 @@ TEST(Panel, GroundBelowTheFalseSunCastsNoShadow) {
   EXPECT_NEAR(e[0].direct.y, 1000 * 0.6f / std::sqrt(1.36f), 0.5f);
 }
 
+TEST(Panel, RightIsRightAndUpIsUpAsSeenFromTheRoom) {
+  const Engine engine(south_room(0.f), test::tregenza(), quick_options());
+  const AngleBins bins = klems();
+  const float theta = 60 * kPi / 180;
+  const auto light_into = [&](glm::vec3 direction) {
+    Condition condition = dark();
+    condition.residuals.push_back({0, kSun, std::vector<glm::vec3>(145, glm::vec3(0))});
+    condition.residuals[0].radiance[static_cast<std::size_t>(bins.bin_of(direction))] = glm::vec3(1000);
+    const auto e = test::illuminance(engine, *engine.relight(condition),
+                                     {{0, 1, 1.5}, {kWidth, 1, 1.5}, {2, 1, kHeight}, {2, 1, 0}},
+                                     {{1, 0, 0}, {-1, 0, 0}, {0, 0, -1}, {0, 0, 1}}, {64, 4096});
+    return std::vector<float>{e[0].sky.y, e[1].sky.y, e[2].sky.y, e[3].sky.y};
+  };
+  const float s = std::sin(theta), c = std::cos(theta);
+  const std::vector<glm::vec3> ways{{s, 0, c}, {-s, 0, c}, {0, s, c}, {0, -s, c}};  // right, left, up, down
+  for (std::size_t way = 0; way < ways.size(); ++way) {
+    const std::vector<float> walls = light_into(ways[way]);  // west, east, ceiling, floor
+    for (std::size_t wall = 0; wall < walls.size(); ++wall) {
+      if (wall == way)
+        EXPECT_GT(walls[wall], 1) << way;
+      else
+        EXPECT_LT(walls[wall], 0.2f * walls[way]) << way << " " << wall;
+    }
+  }
+}
+
 TEST(Panel, NothingPassesBeforeAProductIsSetNorFromTheRoomSide) {
   const Engine engine(south_room(0.5f), test::tregenza(), quick_options());
   Condition condition = test::uniform_sky(5000, 1000);
