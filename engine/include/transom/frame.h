@@ -1,7 +1,6 @@
 /// @file Pictures: primary rays, light between nodes, beams per pixel, edges averaged over the pixel.
 #pragma once
 
-#include <deque>
 #include <glm/glm.hpp>
 #include <memory>
 #include <span>
@@ -85,7 +84,7 @@ class FrameRenderer {
   std::unique_ptr<GlContext> context_;
   std::unique_ptr<ShadowVolumes> volumes_;
   std::vector<VolumeGroup> volume_groups_;  // openings of one kind and orientation, as the stencil counts them
-  std::deque<std::pair<glm::vec4, VolumeCasters>> behind_planes_;  // what stands on the room side of panels
+  std::vector<std::pair<glm::vec4, VolumeCasters>> behind_planes_;  // what stands on the room side of panels
 };
 
 }  // namespace transom
