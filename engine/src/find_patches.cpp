@@ -93,8 +93,7 @@ void Engine::find_patches(std::vector<int> wave, const Known& known) {
     }
     const std::size_t base = patch_rows_.size();
     patch_rows_.resize(base + wave.size());
-    parallel_indices(wave.size(), kGrain,
-                     [&](std::size_t i) { patch_rows_[base + i] = patch_row(wave[i], known); });
+    parallel_indices(wave.size(), kGrain, [&](std::size_t i) { patch_rows_[base + i] = patch_row(wave[i], known); });
     std::vector<int> next;
     for (std::size_t i = base; i < patch_rows_.size(); ++i)
       for (const std::vector<Share>* shares : {&patch_rows_[i].around->reached, &patch_rows_[i].beyond->through})
