@@ -309,6 +309,7 @@ NB_MODULE(_engine, m) {
             const int w = frame.width, h = frame.height;
             result["radiance"] = picture(std::move(frame.radiance), w, h);
             result["edge_pixel_count"] = frame.edge_pixel_count;
+            result["pass_count"] = frame.pass_count;
             if (!components) return result;
             result["sun"] = picture(std::move(frame.sun), w, h);
             result["sky"] = picture(std::move(frame.sky), w, h);

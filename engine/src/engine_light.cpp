@@ -66,6 +66,13 @@ Lighting Engine::direct_light_of(Condition condition) const {
   }
   find_panel_radiance({}, lighting);
   find_sky_light(lighting);
+  if (panel_patches_.entries.empty()) return lighting;
+  // Surfaces outdoors send on most of what they will in the end once they have their direct light.
+  std::vector<glm::vec3> radiosity(lighting.patch_sky.size());
+  for (std::size_t p = 0; p < radiosity.size(); ++p)
+    radiosity[p] = patch_emitted_[p] + patch_reflectance_[p] * (lighting.patch_sky[p] + lighting.patch_sun[p]);
+  find_panel_radiance(radiosity, lighting);
+  find_sky_light(lighting);
   return lighting;
 }
 

@@ -71,7 +71,9 @@ class DirectLight {
   void add_sun(const Beam& sun, const Receivers& receivers, const Patterns& patterns,
                std::vector<std::vector<glm::vec3>>& sum) const;
   std::vector<std::size_t> reached_by_lobe(const Beam& lobe, const Receivers& receivers) const;
-  void lobe_on_slot(const Beam& lobe, int slot, std::uint32_t seed, std::vector<float>& mean) const;
+  std::vector<std::vector<glm::vec3>> element_outlines(int slot, const Corners& corners) const;
+  void lobe_on_slot(const Beam& lobe, int slot, const Corners& corners, std::uint32_t seed,
+                    std::vector<float>& mean) const;
   void add_lobe(const Beam& lobe, const Receivers& receivers, std::uint32_t seed,
                 std::vector<std::vector<glm::vec3>>& sum) const;
   void shaft_transmission(const Beam& lobe, std::span<const glm::vec3> points, std::span<float> share) const;

@@ -33,7 +33,8 @@ class Interreflection {
   int solve(const std::vector<glm::vec3>& emitted, const std::vector<glm::vec3>& direct, double tolerance,
             int maximum_cycles, std::vector<glm::vec3>& irradiance, const AfterCycle& after_cycle = {}) const;
 
-  /// Replaces the reflectance of one patch. What clusters carry stays as it was prepared: it costs cycles, not accuracy.
+  /// Replaces the reflectance of one patch. What clusters carry stays as it was prepared: it costs cycles, not
+  /// accuracy.
   void set_reflectance(std::size_t patch, glm::vec3 reflectance) { reflectance_[patch] = reflectance; }
 
   int cluster_count() const { return cluster_count_; }
