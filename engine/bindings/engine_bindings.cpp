@@ -329,6 +329,18 @@ NB_MODULE(_engine, m) {
             return to_array<float>(std::move(areas), {n});
           },
           nb::rv_policy::move, "Exposed area of each patch [m²].")
+      .def_prop_ro(
+          "plan",
+          [](const Session& s) {
+            const RelightPlan& plan = s.present->plan;
+            nb::dict result;
+            result["channels"] = plan.is_grey ? 1 : 3;
+            result["beams"] = plan.beams.beams;
+            result["facing_openings"] = plan.beams.facing_openings;
+            result["beam_patches"] = plan.beams.patches;
+            return result;
+          },
+          "How much of the last relighting its condition needed.")
       .def_prop_ro("sweeps", [](const Session& s) { return s.present->sweeps; })
       .def_prop_ro("shots", [](const Session& s) { return s.present->shots; })
       .def_prop_ro("unshot_share", [](const Session& s) { return s.present->unshot_share; })

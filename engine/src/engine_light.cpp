@@ -40,15 +40,23 @@ std::vector<BrightElement> Engine::bright_elements(std::span<const LitElement> l
   return bright;
 }
 
+bool Engine::is_grey(const Condition& condition) const {
+  const auto is_grey = [](glm::vec3 colour) { return colour.x == colour.y && colour.y == colour.z; };
+  return is_grey_scene_ && is_grey(condition.sky_colour) && is_grey(condition.ground_luminance) &&
+         std::all_of(condition.beams.begin(), condition.beams.end(),
+                     [&](const Beam& beam) { return is_grey(beam.normal_illuminance); });
+}
+
 // Light that has not been reflected: of beams and point sources on elements, of the sky on patches and at nodes.
 Lighting Engine::direct_light_of(Condition condition) const {
   Lighting lighting;
   lighting.condition = std::move(condition);
+  lighting.plan.is_grey = is_grey(lighting.condition);
   const std::size_t n = slot_of_patch_.size(), node_count = node_sky_.row_count();
   {
     const TracePhase phase(trace_, "beams");
-    lighting.lit_elements =
-        beam_light_->deposit(lighting.condition.beams, receivers_, hash_seed(options_.seed, kBeamStream));
+    lighting.lit_elements = beam_light_->deposit(lighting.condition.beams, receivers_,
+                                                 hash_seed(options_.seed, kBeamStream), &lighting.plan.beams);
     lighting.beam_lit_count = lighting.lit_elements.size();
     lighting.lit_elements.insert(lighting.lit_elements.end(), lit_by_sources_.begin(), lit_by_sources_.end());
     lighting.bright_elements = bright_elements({lighting.lit_elements.data(), lighting.beam_lit_count});
@@ -117,7 +125,8 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
   std::vector<glm::vec3> first_reflection = node_always_;
   {
     const TracePhase phase(trace_, "first reflection");
-    links_->add_irradiance({lighting->bright_elements.data(), lighting->beam_bright_count}, first_reflection);
+    links_->add_irradiance({lighting->bright_elements.data(), lighting->beam_bright_count}, lighting->plan.is_grey,
+                           first_reflection);
   }
   if (!is_wanted()) return nullptr;
   std::vector<glm::vec3> direct(slot_of_patch_.size());
@@ -136,8 +145,8 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
   };
   {
     const TracePhase phase(trace_, "interreflection");
-    lighting->sweeps = interreflection_->solve(patch_emitted_, direct, options_.tolerance, kMaximumCycles,
-                                               lighting->patch_irradiance, after_cycle);
+    lighting->sweeps = interreflection_->solve({patch_emitted_, direct, lighting->plan.is_grey}, options_.tolerance,
+                                               kMaximumCycles, lighting->patch_irradiance, after_cycle);
   }
   if (lighting->sweeps == 0 || !is_wanted()) return nullptr;
   gather_indirect(*lighting, first_reflection);

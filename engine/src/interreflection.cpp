@@ -148,6 +148,7 @@ void Interreflection::cluster_means(const std::vector<glm::vec4>& values, std::v
 }
 
 // What the likeness of the exchange makes of a radiosity and of its means over clusters.
+template <bool kIsGrey>
 void Interreflection::reflect_likeness(const std::vector<glm::vec4>& radiosity, const std::vector<glm::vec4>& mean,
                                        std::vector<glm::vec4>& irradiance) const {
   std::vector<float> channel[3];
@@ -162,22 +163,29 @@ void Interreflection::reflect_likeness(const std::vector<glm::vec4>& radiosity, 
     for (std::size_t k = 0; k < far_stride_; k += kLanes) {
       const Lanes weight = __builtin_convertvector(__builtin_convertvector(load<Counts>(row + k), Integers), Lanes);
       r += weight * load<Lanes>(red + k);
-      g += weight * load<Lanes>(green + k);
-      b += weight * load<Lanes>(blue + k);
+      if constexpr (!kIsGrey) {
+        g += weight * load<Lanes>(green + k);
+        b += weight * load<Lanes>(blue + k);
+      }
     }
     glm::vec4 sum(0);
-    for (std::size_t lane = 0; lane < kLanes; ++lane) sum += glm::vec4(r[lane], g[lane], b[lane], 0);
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      sum += kIsGrey ? glm::vec4(glm::vec3(r[lane]), 0) : glm::vec4(r[lane], g[lane], b[lane], 0);
     irradiance[i] = far_scale_[i] * sum + near_.dot(i, radiosity);
   });
 }
 
 // Adds to a radiosity what is left over, and all that its further reflections bring, by the likeness.
-void Interreflection::carry_on(const std::vector<glm::vec4>& left, std::vector<glm::vec4>& radiosity) const {
+void Interreflection::carry_on(const std::vector<glm::vec4>& left, bool is_grey,
+                               std::vector<glm::vec4>& radiosity) const {
   const std::size_t n = areas_.size(), m = static_cast<std::size_t>(cluster_count_);
   std::vector<glm::vec4> sum = left, received(n), mean, mean_after, carried(m);
   cluster_means(sum, mean);
   for (int cycle = 0; cycle < kInnerCycles; ++cycle) {
-    reflect_likeness(sum, mean, received);
+    if (is_grey)
+      reflect_likeness<true>(sum, mean, received);
+    else
+      reflect_likeness<false>(sum, mean, received);
     for (std::size_t i = 0; i < n; ++i) sum[i] = left[i] + glm::vec4(reflectance_[i], 0) * received[i];
     cluster_means(sum, mean_after);
     for (std::size_t c = 0; c < m; ++c) mean[c] = mean_after[c] - mean[c];
@@ -192,19 +200,18 @@ void Interreflection::carry_on(const std::vector<glm::vec4>& left, std::vector<g
   for (std::size_t i = 0; i < n; ++i) radiosity[i] += sum[i];
 }
 
-int Interreflection::solve(const std::vector<glm::vec3>& emitted, const std::vector<glm::vec3>& direct,
-                           double tolerance, int maximum_cycles, std::vector<glm::vec3>& irradiance,
-                           const AfterCycle& after_cycle) const {
+int Interreflection::solve(const PatchLight& light, double tolerance, int maximum_cycles,
+                           std::vector<glm::vec3>& irradiance, const AfterCycle& after_cycle) const {
   const std::size_t n = areas_.size();
   std::vector<glm::vec4> radiosity(n, glm::vec4(0)), left(n);
-  for (std::size_t i = 0; i < n; ++i) left[i] = glm::vec4(emitted[i] + reflectance_[i] * direct[i], 0);
-  irradiance = direct;
+  for (std::size_t i = 0; i < n; ++i) left[i] = glm::vec4(light.emitted[i] + reflectance_[i] * light.direct[i], 0);
+  irradiance = light.direct;
   double before = 0;
   for (int cycle = 1; cycle <= maximum_cycles; ++cycle) {
-    carry_on(left, radiosity);
+    carry_on(left, light.is_grey, radiosity);
     parallel_indices(n, kGrain, [&](std::size_t i) {
-      irradiance[i] = direct[i] + glm::vec3(exchange_.dot(i, radiosity));
-      left[i] = glm::vec4(emitted[i] + reflectance_[i] * irradiance[i], 0) - radiosity[i];
+      irradiance[i] = light.direct[i] + glm::vec3(exchange_.dot(i, radiosity));
+      left[i] = glm::vec4(light.emitted[i] + reflectance_[i] * irradiance[i], 0) - radiosity[i];
     });
     double change = 0, total = 0;
     for (std::size_t i = 0; i < n; ++i) {

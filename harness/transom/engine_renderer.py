@@ -90,6 +90,7 @@ class EngineRenderer:
         report(2, 3)
         facts: dict[str, Any] = {
             **engine.facts(),
+            "plan": engine.plan(),
             "beams": 0 if condition.sun_direction is None else 1,
             "sweeps": engine.sweeps,
             "energy_imbalance": engine.audit().imbalance,

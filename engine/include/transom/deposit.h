@@ -19,6 +19,12 @@ struct LitElement {
   glm::vec3 illuminance;
 };
 
+/// What beams took: those that some opening or patch outdoors faces, the opening faces that face them, and the patches
+/// that their light might reach, summed over beams.
+struct BeamPlan {
+  int beams = 0, facing_openings = 0, patches = 0;
+};
+
 /// Casts light from beams and point sources on patches and points. Openings on the way take their share.
 ///
 /// Elements look for the sun through openings. An opening that is smaller than an element would be missed by most of
@@ -44,7 +50,8 @@ class DirectLight {
   /// Mean direct illuminance of the elements of the receivers that receive any, in their order. Stratified over each
   /// element; of a patch that is partly lit, elements at the edge of light are sampled eight times as densely. Patches
   /// behind openings cost rays only where the outline of an opening falls on them.
-  std::vector<LitElement> deposit(const std::vector<Beam>& beams, const Receivers& receivers, std::uint32_t seed) const;
+  std::vector<LitElement> deposit(const std::vector<Beam>& beams, const Receivers& receivers, std::uint32_t seed,
+                                  BeamPlan* plan = nullptr) const;
 
   /// Share of a beam that arrives at lifted points: 0 where something opaque intervenes, else the transmittance.
   void beam_transmission(glm::vec3 direction_to_source, std::span<const glm::vec3> points,
@@ -64,12 +71,13 @@ class DirectLight {
   using Corners = std::array<glm::vec3, 4>;
   std::vector<glm::vec3> points_on(int slot, const Corners& corners, std::span<const int> elements, int samples,
                                    const Patterns& patterns) const;
-  std::vector<std::size_t> reached(glm::vec3 direction, const Receivers& receivers) const;
+  std::vector<std::size_t> reached(glm::vec3 direction, const Receivers& receivers,
+                                   const std::vector<int>& openings) const;
   std::vector<float> sample_beam(glm::vec3 direction, const Receivers& receivers,
                                  const std::vector<std::size_t>& candidates, const Patterns& patterns) const;
   std::vector<int> partly_lit(int slot, const std::vector<int>& place_of_slot, const std::vector<float>& share) const;
   void add_beam(const Beam& beam, const Receivers& receivers, const Patterns& patterns,
-                std::vector<std::vector<glm::vec3>>& sum) const;
+                std::vector<std::vector<glm::vec3>>& sum, BeamPlan& plan) const;
   void sources_on_slot(int slot, const Corners& corners, glm::vec3 normal, const Patterns& patterns,
                        std::vector<glm::vec3>& sum) const;
 

@@ -131,6 +131,7 @@ class Engine {
   Lighting direct_classic(Condition condition, const Lighting* previous) const;
   void show_classic(Lighting& lighting) const;
   Lighting direct_light_of(Condition condition) const;
+  bool is_grey(const Condition& condition) const;
   std::shared_ptr<const Lighting> with_indirect_of(Lighting lighting, const Lighting* previous) const;
   void find_smooth_radiosity(Lighting& lighting) const;
   void gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& first_reflection) const;
@@ -161,6 +162,7 @@ class Engine {
   std::vector<char> is_interior_;
   DirectLight::Receivers receivers_;  // all patches
   std::vector<int> unseen_slots_;     // that see patches indoors and were seen by none
+  bool is_grey_scene_ = false;        // all reflectances and emitters
   bool connects_emitters_ = false;    // small emitters: found by connection, not by rays
   SparseRows form_factors_, through_, patch_sky_;
   std::unique_ptr<Interreflection> interreflection_;

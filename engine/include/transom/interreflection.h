@@ -16,6 +16,13 @@ struct PatchPlace {
   glm::vec3 normal{0};
 };
 
+/// What patches send out and receive of their own. is_grey: all of it is grey, and so are the reflectances.
+struct PatchLight {
+  const std::vector<glm::vec3>& emitted;  ///< [lm/m²]
+  const std::vector<glm::vec3>& direct;   ///< [lx]
+  bool is_grey = false;
+};
+
 /// A solver in three steps of precision. Each cycle reflects once between patches, exactly. What is left over after it
 /// is carried through all further reflections by a likeness of the exchange: its large form factors as they are, and
 /// all others with the patches of a cluster taken together, as dense rows. The likeness is solved in turn with the help
@@ -33,8 +40,8 @@ class Interreflection {
   /// Irradiance of each patch. Returns the number of cycles until the flux that is still to come, as the shrinking of
   /// remainders foretells it, is below `tolerance` of all flux, or 0 where `after_cycle` has ended it; throws
   /// std::runtime_error when `maximum_cycles` do not suffice.
-  int solve(const std::vector<glm::vec3>& emitted, const std::vector<glm::vec3>& direct, double tolerance,
-            int maximum_cycles, std::vector<glm::vec3>& irradiance, const AfterCycle& after_cycle = {}) const;
+  int solve(const PatchLight& light, double tolerance, int maximum_cycles, std::vector<glm::vec3>& irradiance,
+            const AfterCycle& after_cycle = {}) const;
 
   int cluster_count() const { return cluster_count_; }
 
@@ -42,9 +49,10 @@ class Interreflection {
   void find_clusters(const std::vector<PatchPlace>& places);
   void find_operators();
   void find_likeness();
+  template <bool kIsGrey>
   void reflect_likeness(const std::vector<glm::vec4>& radiosity, const std::vector<glm::vec4>& mean,
                         std::vector<glm::vec4>& irradiance) const;
-  void carry_on(const std::vector<glm::vec4>& left, std::vector<glm::vec4>& radiosity) const;
+  void carry_on(const std::vector<glm::vec4>& left, bool is_grey, std::vector<glm::vec4>& radiosity) const;
   void cluster_means(const std::vector<glm::vec4>& values, std::vector<glm::vec4>& means) const;
 
   SparseRows exchange_;  // F + K

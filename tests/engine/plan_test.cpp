@@ -1,0 +1,87 @@
+// A relighting does no more than its scene and its condition need, and says so.
+#include <gtest/gtest.h>
+
+#include "rooms.h"
+
+namespace transom {
+namespace {
+
+using test::roof_light_room;
+using test::tregenza;
+using test::uniform_sky;
+
+SolveOptions small_options() {
+  SolveOptions options;
+  options.target_patch_count = 600;
+  options.patch_samples = {128, 64};
+  options.node_samples = {64, 64};
+  return options;
+}
+
+Condition sunny(glm::vec3 to_sun, glm::vec3 illuminance) {
+  Condition condition = uniform_sky(3000, 500);
+  condition.beams.push_back({glm::normalize(to_sun), illuminance});
+  return condition;
+}
+
+TEST(Plan, AGreySceneInGreyLightComputesOneChannelAndFindsWhatThreeFind) {
+  const Engine engine(roof_light_room(0.6f, 0.8f), tregenza(), small_options());
+  const glm::vec3 to_sun(0.2f, 0.3f, 1);
+  const auto grey = engine.relight(sunny(to_sun, glm::vec3(60000))),
+             coloured = engine.relight(sunny(to_sun, {60000, 59000, 61000}));
+  EXPECT_TRUE(grey->plan.is_grey);
+  EXPECT_FALSE(coloured->plan.is_grey);
+  ASSERT_EQ(grey->sweeps, coloured->sweeps);
+  for (std::size_t i = 0; i < grey->node_indirect.size(); ++i) {
+    EXPECT_FLOAT_EQ(grey->node_indirect[i].x, coloured->node_indirect[i].x);
+    EXPECT_EQ(grey->node_indirect[i], glm::vec3(grey->node_indirect[i].x));
+  }
+  for (std::size_t p = 0; p < grey->patch_irradiance.size(); ++p)
+    EXPECT_FLOAT_EQ(grey->patch_irradiance[p].x, coloured->patch_irradiance[p].x);
+}
+
+TEST(Plan, AColouredReflectanceMakesTheSceneColoured) {
+  SceneGeometry scene = roof_light_room(0.6f);
+  scene.materials[0].reflectance = {0.6f, 0.6f, 0.5f};
+  const Engine engine(scene, tregenza(), small_options());
+  EXPECT_FALSE(engine.relight(uniform_sky(1000))->plan.is_grey);
+}
+
+TEST(Plan, AnOvercastSkyHasNoBeams) {
+  const Engine engine(roof_light_room(0.6f), tregenza(), small_options());
+  const auto light = engine.relight(uniform_sky(1000));
+  EXPECT_EQ(light->plan.beams.beams, 0);
+  EXPECT_EQ(light->plan.beams.patches, 0);
+  EXPECT_TRUE(light->lit_elements.empty());
+}
+
+TEST(Plan, ABeamThatNoOpeningFacesIsLeftOut) {
+  const Engine engine(roof_light_room(0.6f), tregenza(), small_options());
+  const auto below = engine.relight(sunny({0.2f, 0.3f, -1}, glm::vec3(60000))),
+             above = engine.relight(sunny({0.2f, 0.3f, 1}, glm::vec3(60000)));
+  EXPECT_EQ(below->plan.beams.beams, 0);
+  EXPECT_EQ(below->plan.beams.facing_openings, 0);
+  EXPECT_TRUE(below->lit_elements.empty());
+  EXPECT_EQ(above->plan.beams.beams, 1);
+  EXPECT_GT(above->plan.beams.facing_openings, 0);
+}
+
+TEST(Plan, OnlyPatchesThatTheOutlineOfAnOpeningFallsOnAreLookedAt) {
+  // 4 x 4 of the floor's 8 x 8 patches are lit; those around them, which the outline touches, are looked at too.
+  const Engine engine(roof_light_room(0.6f), tregenza(), small_options());
+  const auto light = engine.relight(sunny({0, 0, 1}, glm::vec3(60000)));
+  double lit = 0;
+  int floor_patches = 0;
+  for (const LitElement& e : light->lit_elements) {
+    const Slot slot = engine.mesh().slot(e.element / engine.mesh().elements_per_slot());
+    lit += e.illuminance.y *
+           engine.mesh().element_area(slot.face, slot.cell, e.element % engine.mesh().elements_per_slot());
+  }
+  for (const int slot : engine.patch_slots()) floor_patches += engine.mesh().slot(slot).face == 0;
+  EXPECT_NEAR(lit / (4 * 60000), 1, 5e-3);
+  EXPECT_EQ(floor_patches, 64);
+  EXPECT_EQ(light->plan.beams.patches, 36);
+}
+
+}  // namespace
+}  // namespace transom
