@@ -83,5 +83,27 @@ TEST(Plan, OnlyPatchesThatTheOutlineOfAnOpeningFallsOnAreLookedAt) {
   EXPECT_EQ(light->plan.beams.patches, 36);
 }
 
+TEST(Plan, OutlinesLoseNoLight) {
+  // Every element has the light that it has when all patches that face the beam are looked at.
+  const Engine engine(roof_light_room(0.6f), tregenza(), small_options());
+  const DirectLight& light = engine.direct_light();
+  std::vector<int> indoors;
+  for (const int slot : engine.patch_slots())
+    if (engine.scene().materials[engine.faces().faces[engine.mesh().slot(slot).face].material].opening < 0)
+      indoors.push_back(slot);
+  const auto outlined = light.receivers(indoors, std::vector<char>(indoors.size(), 1)),
+             all = light.receivers(indoors, {});
+  for (int k = 0; k < 12; ++k) {
+    const float azimuth = 0.5f * static_cast<float>(k), height = 0.3f + 0.2f * static_cast<float>(k % 5);
+    const Beam beam{glm::normalize(glm::vec3(std::cos(azimuth), std::sin(azimuth), height)), glm::vec3(1000)};
+    const std::vector<LitElement> few = light.deposit({beam}, outlined, 1), many = light.deposit({beam}, all, 1);
+    ASSERT_EQ(few.size(), many.size()) << k;
+    for (std::size_t i = 0; i < few.size(); ++i) {
+      EXPECT_EQ(few[i].element, many[i].element);
+      EXPECT_EQ(few[i].illuminance, many[i].illuminance);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace transom

@@ -40,16 +40,16 @@ class DirectLight {
   struct Receivers {
     std::vector<int> slots;
     std::vector<char> is_behind_openings;  ///< beams reach it through openings alone
-    std::vector<std::array<glm::vec3, 4>>
-        corners;                     ///< lifted, at (0, 0), (1, 0), (1, 1), (0, 1); triangles: (0, 1) twice
+    /// Of each patch, lifted: at (0, 0), (1, 0), (1, 1) and (0, 1) of its cell; of a triangle the third is the fourth.
+    std::vector<std::array<glm::vec3, 4>> corners;
     std::vector<glm::vec3> normals;  ///< of the lit side
   };
   /// is_behind_openings: empty where none is known to be.
   Receivers receivers(const std::vector<int>& slots, std::vector<char> is_behind_openings) const;
 
   /// Mean direct illuminance of the elements of the receivers that receive any, in their order. Stratified over each
-  /// element; of a patch that is partly lit, elements at the edge of light are sampled eight times as densely. Patches
-  /// behind openings cost rays only where the outline of an opening falls on them.
+  /// element, eight times as densely at edges of light. Patches behind openings cost rays only where the outline of an
+  /// opening falls on them. plan: what it took is added to it; may be null.
   std::vector<LitElement> deposit(const std::vector<Beam>& beams, const Receivers& receivers, std::uint32_t seed,
                                   BeamPlan* plan = nullptr) const;
 
