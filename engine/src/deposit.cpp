@@ -198,8 +198,16 @@ std::vector<int> DirectLight::partly_lit(int slot_index, const std::vector<int>&
 // sampled densely; the others keep two samples that did not tell: then the thin shadows that none of them found are, in
 // the mean, made up for.
 void DirectLight::add_sun(const Beam& sun, const Receivers& receivers, const Patterns& patterns,
-                          std::vector<std::vector<glm::vec3>>& sum) const {
-  const std::vector<std::size_t> candidates = reached(sun.direction_to_source, receivers);
+                          std::vector<std::vector<glm::vec3>>& sum, BeamPlan& plan) const {
+  // From indoors, light comes only through openings whose outer side faces it.
+  std::vector<int> facing;
+  for (const int f : large_openings_)
+    if (glm::dot(mesh_.faces().faces[f].normal, sun.direction_to_source) > 0) facing.push_back(f);
+  const std::vector<std::size_t> candidates = reached(sun.direction_to_source, receivers, facing);
+  plan.facing_openings += static_cast<int>(facing.size());
+  plan.patches += static_cast<int>(candidates.size());
+  if (candidates.empty()) return;
+  ++plan.beams;
   const std::vector<float> share = sample_sun(sun, receivers, candidates, patterns);
   std::vector<int> place_of_slot(static_cast<std::size_t>(mesh_.slot_count()), -1);
   for (std::size_t k = 0; k < candidates.size(); ++k)
@@ -240,9 +248,10 @@ void DirectLight::sources_on_slot(int slot_index, const Corners& corners, glm::v
 }
 
 // The receivers that a beam may reach.
-std::vector<std::size_t> DirectLight::reached(glm::vec3 direction, const Receivers& receivers) const {
+std::vector<std::size_t> DirectLight::reached(glm::vec3 direction, const Receivers& receivers,
+                                              const std::vector<int>& openings) const {
   std::vector<std::size_t> found;
-  const BeamOutlines outlines(mesh_.faces(), large_openings_, direction);
+  const BeamOutlines outlines(mesh_.faces(), openings, direction);
   int known_face = -1;
   std::vector<int> passages;  // over that face
   for (std::size_t i = 0; i < receivers.slots.size(); ++i) {
@@ -329,7 +338,8 @@ std::map<int, glm::vec3> DirectLight::send_through_small_openings(const std::vec
 }
 
 std::vector<LitElement> DirectLight::deposit(const std::vector<Beam>& beams, const Receivers& receivers,
-                                             std::uint32_t seed) const {
+                                             std::uint32_t seed, BeamPlan* plan) const {
+  BeamPlan unasked;
   std::vector<LitElement> lit;
   if (beams.empty() && sources_.empty()) return lit;
   const Patterns patterns(seed);
@@ -338,9 +348,9 @@ std::vector<LitElement> DirectLight::deposit(const std::vector<Beam>& beams, con
   for (const Beam& beam : beams) {
     if (beam.normal_illuminance == glm::vec3(0)) continue;
     if (beam.opening < 0)
-      add_sun(beam, receivers, patterns, sum);
+      add_sun(beam, receivers, patterns, sum, plan ? *plan : unasked);
     else
-      add_lobe(beam, receivers, seed, sum);
+      add_lobe(beam, receivers, seed, sum, plan ? *plan : unasked);
   }
   parallel_indices(receivers.slots.size(), kGrain, [&](std::size_t i) {
     if (mesh_.is_cluster(receivers.slots[i])) sources_and_beams_on_cluster(beams, receivers.slots[i], seed, sum[i]);

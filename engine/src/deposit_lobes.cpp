@@ -120,8 +120,10 @@ std::vector<std::size_t> DirectLight::reached_by_lobe(const Beam& lobe, const Re
 
 // Adds a lobe to the light of elements, by receiver.
 void DirectLight::add_lobe(const Beam& lobe, const Receivers& receivers, std::uint32_t seed,
-                           std::vector<std::vector<glm::vec3>>& sum) const {
+                           std::vector<std::vector<glm::vec3>>& sum, BeamPlan& plan) const {
   const std::vector<std::size_t> candidates = reached_by_lobe(lobe, receivers);
+  plan.patches += static_cast<int>(candidates.size());
+  plan.beams += !candidates.empty();
   const auto per_slot = static_cast<std::size_t>(mesh_.elements_per_slot());
   parallel_indices(candidates.size(), kGrain, [&](std::size_t k) {
     const std::size_t i = candidates[k];

@@ -159,6 +159,11 @@ void Engine::assemble_transfer(const Known& known) {
     if (is_interior_[p]) interior += patch_area_[p];
     if (is_interior_[p] && patch_emitted_[p] != glm::vec3(0)) emitting += patch_area_[p];
   }
+  const auto is_grey = [](glm::vec3 colour) { return colour.x == colour.y && colour.y == colour.z; };
+  is_grey_scene_ = std::all_of(patch_reflectance_.begin(), patch_reflectance_.end(), is_grey) &&
+                   std::all_of(patch_emitted_.begin(), patch_emitted_.end(), is_grey) &&
+                   std::all_of(scene_.point_sources.begin(), scene_.point_sources.end(),
+                               [&](const PointSource& source) { return is_grey(source.intensity); });
   connects_emitters_ = emitting < kConnectedShare * interior;
   if (known.has_same_patches && is_interior_ == known.engine->is_interior_) {
     form_factors_ = known.engine->form_factors_;

@@ -193,8 +193,8 @@ bool Engine::solve_with_panels(Lighting& lighting, const Interreflection::AfterC
   std::vector<glm::vec3> direct(n), radiosity;
   for (int round = 0; round < kMaximumRounds; ++round) {
     for (std::size_t p = 0; p < n; ++p) direct[p] = lighting.patch_sky[p] + lighting.patch_sun[p];
-    const int cycles = interreflection_->solve(patch_emitted_, direct, options_.tolerance, kMaximumCycles,
-                                               lighting.patch_irradiance, after_cycle);
+    const int cycles = interreflection_->solve({patch_emitted_, direct, lighting.plan.is_grey}, options_.tolerance,
+                                               kMaximumCycles, lighting.patch_irradiance, after_cycle);
     if (cycles == 0) return false;
     lighting.sweeps += cycles;
     if (panel_patches_.entries.empty()) return true;

@@ -279,7 +279,55 @@ PointLinks::LitPatch PointLinks::lit_patch(std::span<const BrightElement> bright
   return patch;
 }
 
-void PointLinks::add_irradiance(std::span<const BrightElement> bright, std::vector<glm::vec3>& irradiance) const {
+// What lit patches send to the points of a few blocks.
+template <bool kIsGrey>
+void PointLinks::add_blocks(const std::vector<LitPatch>& lit, std::span<const BrightElement> bright, std::size_t chunk,
+                            std::vector<glm::vec3>& irradiance) const {
+  const int per_slot = mesh_.elements_per_slot();
+  const std::size_t block_count = x_.size() / kBlock;
+  const std::size_t first_block = chunk * kBlocksAtOnce,
+                    last_block = std::min(block_count, first_block + kBlocksAtOnce), base = first_block * kBlock;
+  float red[kBlocksAtOnce * kBlock] = {}, green[kBlocksAtOnce * kBlock] = {}, blue[kBlocksAtOnce * kBlock] = {};
+  for (const LitPatch& patch : lit) {
+    const Link& link = *patch.link;
+    const glm::vec3 c = patch.centroid, m = patch.normal, flux = patch.flux;
+    auto block = std::lower_bound(link.block.begin(), link.block.end(), static_cast<int>(first_block));
+    for (; block != link.block.end() && *block < static_cast<int>(last_block); ++block) {
+      const std::uint8_t* seen = &link.seen[static_cast<std::size_t>(block - link.block.begin()) * kBlock];
+      const std::size_t from = static_cast<std::size_t>(*block) * kBlock, to = from - base;
+      for (std::size_t k = 0; k < kBlock; ++k) {
+        const float dx = c.x - x_[from + k], dy = c.y - y_[from + k], dz = c.z - z_[from + k];
+        const float height = std::max(0.f, -(dx * m.x + dy * m.y + dz * m.z));
+        const float cosine = std::max(0.f, dx * nx_[from + k] + dy * ny_[from + k] + dz * nz_[from + k]);
+        const float distance2 = std::max(kLeastDistance2, dx * dx + dy * dy + dz * dz);
+        const float root = static_cast<float>(static_cast<int>(seen[k])) * (1.f / 255);
+        const float weight = height * cosine * root * root / (distance2 * distance2);
+        red[to + k] += weight * flux.x;
+        if constexpr (!kIsGrey) {
+          green[to + k] += weight * flux.y;
+          blue[to + k] += weight * flux.z;
+        }
+      }
+    }
+    auto near = std::lower_bound(link.near_point.begin(), link.near_point.end(), static_cast<int>(base));
+    for (; near != link.near_point.end() && *near < static_cast<int>(last_block * kBlock); ++near) {
+      const float* weight = &link.near_weight[static_cast<std::size_t>(near - link.near_point.begin()) * per_slot];
+      glm::vec3 sum(0);
+      for (std::size_t k = patch.first_bright; k < patch.last_bright; ++k)
+        sum += weight[bright[k].element % per_slot] * bright[k].radiosity;
+      const std::size_t to = static_cast<std::size_t>(*near) - base;
+      red[to] += sum.x;
+      green[to] += sum.y;
+      blue[to] += sum.z;
+    }
+  }
+  const std::size_t count = std::min(point_count_, last_block * kBlock) - base;
+  for (std::size_t k = 0; k < count; ++k)
+    irradiance[base + k] += kIsGrey ? glm::vec3(red[k]) : glm::vec3(red[k], green[k], blue[k]);
+}
+
+void PointLinks::add_irradiance(std::span<const BrightElement> bright, bool is_grey,
+                                std::vector<glm::vec3>& irradiance) const {
   const int per_slot = mesh_.elements_per_slot();
   std::vector<int> slots;
   for (const BrightElement& b : bright)
@@ -294,44 +342,12 @@ void PointLinks::add_irradiance(std::span<const BrightElement> bright, std::vect
     lit[k].link = links[k];
   });
 
-  const std::size_t block_count = x_.size() / kBlock;
-  parallel_indices((block_count + kBlocksAtOnce - 1) / kBlocksAtOnce, 1, [&](std::size_t chunk) {
-    const std::size_t first_block = chunk * kBlocksAtOnce,
-                      last_block = std::min(block_count, first_block + kBlocksAtOnce), base = first_block * kBlock;
-    float red[kBlocksAtOnce * kBlock] = {}, green[kBlocksAtOnce * kBlock] = {}, blue[kBlocksAtOnce * kBlock] = {};
-    for (const LitPatch& patch : lit) {
-      const Link& link = *patch.link;
-      const glm::vec3 c = patch.centroid, m = patch.normal, flux = patch.flux;
-      auto block = std::lower_bound(link.block.begin(), link.block.end(), static_cast<int>(first_block));
-      for (; block != link.block.end() && *block < static_cast<int>(last_block); ++block) {
-        const std::uint8_t* seen = &link.seen[static_cast<std::size_t>(block - link.block.begin()) * kBlock];
-        const std::size_t from = static_cast<std::size_t>(*block) * kBlock, to = from - base;
-        for (std::size_t k = 0; k < kBlock; ++k) {
-          const float dx = c.x - x_[from + k], dy = c.y - y_[from + k], dz = c.z - z_[from + k];
-          const float height = std::max(0.f, -(dx * m.x + dy * m.y + dz * m.z));
-          const float cosine = std::max(0.f, dx * nx_[from + k] + dy * ny_[from + k] + dz * nz_[from + k]);
-          const float distance2 = std::max(kLeastDistance2, dx * dx + dy * dy + dz * dz);
-          const float root = static_cast<float>(static_cast<int>(seen[k])) * (1.f / 255);
-          const float weight = height * cosine * root * root / (distance2 * distance2);
-          red[to + k] += weight * flux.x;
-          green[to + k] += weight * flux.y;
-          blue[to + k] += weight * flux.z;
-        }
-      }
-      auto near = std::lower_bound(link.near_point.begin(), link.near_point.end(), static_cast<int>(base));
-      for (; near != link.near_point.end() && *near < static_cast<int>(last_block * kBlock); ++near) {
-        const float* weight = &link.near_weight[static_cast<std::size_t>(near - link.near_point.begin()) * per_slot];
-        glm::vec3 sum(0);
-        for (std::size_t k = patch.first_bright; k < patch.last_bright; ++k)
-          sum += weight[bright[k].element % per_slot] * bright[k].radiosity;
-        const std::size_t to = static_cast<std::size_t>(*near) - base;
-        red[to] += sum.x;
-        green[to] += sum.y;
-        blue[to] += sum.z;
-      }
-    }
-    const std::size_t count = std::min(point_count_, last_block * kBlock) - base;
-    for (std::size_t k = 0; k < count; ++k) irradiance[base + k] += glm::vec3(red[k], green[k], blue[k]);
+  const std::size_t chunk_count = (x_.size() / kBlock + kBlocksAtOnce - 1) / kBlocksAtOnce;
+  parallel_indices(chunk_count, 1, [&](std::size_t chunk) {
+    if (is_grey)
+      add_blocks<true>(lit, bright, chunk, irradiance);
+    else
+      add_blocks<false>(lit, bright, chunk, irradiance);
   });
 }
 

@@ -280,6 +280,11 @@ class Engine:
             },
         }
 
+    def plan(self) -> dict[str, int]:
+        """What the present light took: channels (1 where scene and light are grey), beams that reach anything, opening
+        faces that face them, patches that their light might reach; 0 beams under an overcast sky."""
+        return {name: int(count) for name, count in self._core.plan.items()}
+
     def form_factors(self) -> tuple[NDArray[np.int64], NDArray[np.int32], Float32, Float32]:
         """Form factors between patches as compressed sparse rows: begin, column, value; and patch areas [m²]."""
         begin, column, value = self._core.form_factors

@@ -91,6 +91,7 @@ class EngineRenderer:
         report(2, 3)
         facts: dict[str, Any] = {
             **engine.facts(),
+            "plan": engine.plan(),
             "beams": (condition.sun_direction is not None) + engine.lobe_count,
             "lobes": engine.lobe_count,
             "sweeps": engine.sweeps,

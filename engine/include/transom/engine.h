@@ -178,6 +178,7 @@ class Engine {
   Lighting direct_classic(Condition condition, const Lighting* previous) const;
   void show_classic(Lighting& lighting) const;
   Lighting direct_light_of(Condition condition) const;
+  bool is_grey(const Condition& condition) const;
   std::shared_ptr<const Lighting> with_indirect_of(Lighting lighting, const Lighting* previous) const;
   void find_smooth_radiosity(Lighting& lighting) const;
   void gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& first_reflection) const;
@@ -217,6 +218,7 @@ class Engine {
   std::vector<char> is_interior_;
   DirectLight::Receivers receivers_;  // all patches
   std::vector<int> unseen_slots_;     // that see patches indoors and were seen by none
+  bool is_grey_scene_ = false;        // all reflectances and emitters
   bool connects_emitters_ = false;    // small emitters: found by connection, not by rays
   std::shared_ptr<const SparseRows> form_factors_;
   SparseRows through_, patch_sky_;
