@@ -149,7 +149,7 @@ NB_MODULE(_engine, m) {
       .def_rw("elements_per_edge", &SolveOptions::elements_per_edge)
       .def_rw("patch_samples", &SolveOptions::patch_samples)
       .def_rw("node_samples", &SolveOptions::node_samples)
-      .def_rw("node_spacing", &SolveOptions::node_spacing)
+      .def_rw("node_tolerance", &SolveOptions::node_tolerance)
       .def_rw("tolerance", &SolveOptions::tolerance)
       .def_rw("seed", &SolveOptions::seed)
       .def_rw("trace", &SolveOptions::trace);

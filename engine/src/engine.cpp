@@ -17,8 +17,6 @@ namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr std::size_t kGrain = 8;
 constexpr double kConnectedShare = 0.05;   // emitters up to this share of the interior's area are connected, not hit
-constexpr float kLeastDividedSize = 0.5f;  // of the longest edge of patches: smaller cells are fine enough as they are
-constexpr float kExposedNode = 0.5f;       // a node counts when at least this share of its rays is outside solids
 
 }  // namespace
 
@@ -45,7 +43,6 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
                                                 element_edge * element_edge);
   }
   std::vector<GatherRow> rows;
-  std::vector<int> divisions;
   {
     const TracePhase phase(trace_, "patches");
     patch_of_slot_.assign(static_cast<std::size_t>(mesh_->slot_count()), -1);
@@ -56,7 +53,6 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
   }
   {
     const TracePhase phase(trace_, "transfer");
-    divisions = cell_divisions(rows);
     assemble_transfer(rows);
     rows.clear();
   }
@@ -64,9 +60,10 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
     const TracePhase phase(trace_, "forward rays");
     solve_classic();
   } else {
+    lit_by_sources_ = direct_light_->deposit({}, slot_of_patch_, hash_seed(options_.seed, kBeamStream));
     {
       const TracePhase phase(trace_, "nodes");
-      gather_nodes(divisions);
+      gather_nodes();
     }
     const TracePhase phase(trace_, "links");
     light_always();
@@ -132,46 +129,6 @@ void Engine::assemble_transfer(std::vector<GatherRow>& rows) {
   facts_.cluster_count = interreflection_->cluster_count();
 }
 
-// Cells are divided where the harmonic mean distance of what they see is short against their size: there irradiance
-// changes within the cell [after Ward & Heckbert 1992].
-std::vector<int> Engine::cell_divisions(const std::vector<GatherRow>& rows) const {
-  std::vector<int> divisions;
-  for (std::size_t p = 0; p < rows.size(); ++p) {
-    const Slot slot = mesh_->slot(slot_of_patch_[p]);
-    const float size = std::sqrt(mesh_->cell_area(slot.face, slot.cell));
-    const float wanted = size / (options_.node_spacing * std::max(rows[p].harmonic_distance, 1e-6f * faces_.extent));
-    const bool is_small = size < kLeastDividedSize * facts_.maximum_edge_m;
-    divisions.push_back(is_small ? 1 : wanted > 2 ? 4 : wanted > 1 ? 2 : 1);
-  }
-  return divisions;
-}
-
-void Engine::gather_nodes(const std::vector<int>& divisions) {
-  std::vector<int> slots, slot_divisions;
-  for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)
-    if (patch_reflectance_[p] != glm::vec3(0)) {
-      slots.push_back(slot_of_patch_[p]);
-      slot_divisions.push_back(divisions[p]);
-    }
-  nodes_ = std::make_unique<NodeField>(*mesh_, *rays_, slots, slot_divisions);
-  const std::vector<Node>& nodes = nodes_->nodes();
-  facts_.node_count = static_cast<int>(nodes.size());
-  std::vector<GatherRow> rows(nodes.size());
-  parallel_indices(nodes.size(), kGrain, [&](std::size_t i) {
-    rows[i] = gatherer_->gather_at_point(nodes[i], options_.node_samples,
-                                         hash_seed(options_.seed, hash_seed(kNodeStream, i)));
-    rows[i].reached.insert(rows[i].reached.end(), rows[i].through.begin(), rows[i].through.end());
-    rows[i].reached = to_patches(rows[i].reached);
-  });
-  std::vector<char> is_exposed(nodes.size());
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    is_exposed[i] = rows[i].exposure >= kExposedNode;
-    node_sky_.append(rows[i].sky);
-    node_patches_.append(rows[i].reached);
-  }
-  nodes_->finish(std::move(is_exposed));
-}
-
 // Patches that a beam may light: they see some of the sky.
 std::vector<int> Engine::beam_slots() const {
   const int ground = sky_index_->count() - 1;
@@ -188,7 +145,6 @@ std::vector<int> Engine::beam_slots() const {
 
 void Engine::light_always() {
   const int per_slot = mesh_->elements_per_slot();
-  lit_by_sources_ = direct_light_->deposit({}, slot_of_patch_, hash_seed(options_.seed, kBeamStream));
   bright_always_ = bright_elements(lit_by_sources_);
   if (connects_emitters_)
     for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)

@@ -98,6 +98,19 @@ void Engine::relight(Condition condition) {
       lighting_.node_sky[i] = sky_light(node_sky_, i);
       lighting_.node_indirect[i] += glm::vec3(node_patches_.dot(i, radiosity));
     });
+    // What is seen close by is not as even as its patch: the nodes on it, as they are now, speak for it.
+    std::vector<glm::vec4> sent(node_count);
+    parallel_indices(node_count, 64, [&](std::size_t i) {
+      const int face = nodes_->surface(i) / 2;
+      const glm::vec3 emitted = kPi * scene_.materials[faces_.faces[face].material].luminance;
+      sent[i] = glm::vec4(
+          (connects_emitters_ ? glm::vec3(0) : emitted) +
+              reflectance(face, nodes_->surface(i) % 2) * (lighting_.node_sky[i] + lighting_.node_indirect[i]),
+          0);
+    });
+    sent.insert(sent.end(), radiosity.begin(), radiosity.end());
+    parallel_indices(node_count, 64,
+                     [&](std::size_t i) { lighting_.node_indirect[i] += glm::vec3(node_near_.dot(i, sent)); });
   }
 }
 

@@ -38,9 +38,9 @@ class SolveOptions:
     constant patches, progressive shooting [Cutler et al. 2008].
     maximum_edge_m: of a patch [m]; 0 chooses it from target_patch_count. elements_per_edge: a patch has its square.
     patch_rays, patch_opening_rays: rays a patch, over the hemisphere and towards the openings; node_*: the same for
-    each point at which light is shown (a node). node_spacing: of nodes, against the harmonic mean distance of what
-    their cell sees: smaller values put more nodes into corners and under furniture. tolerance: relative flux in flight
-    at which interreflection stops. seed: of all samples.
+    each point at which light is shown (a node). node_tolerance: relative error of interpolated light from which on
+    nodes are added; smaller values put more of them into corners and under furniture. tolerance: relative flux in
+    flight at which interreflection stops. seed: of all samples.
     """
 
     method: Method = "gather"
@@ -51,7 +51,7 @@ class SolveOptions:
     patch_opening_rays: int = 128
     node_rays: int = 1024
     node_opening_rays: int = 256
-    node_spacing: float = 6.0
+    node_tolerance: float = 0.06
     tolerance: float = 1e-4
     seed: int = 1
 
@@ -319,7 +319,7 @@ def _core_options(options: SolveOptions, trace: bool) -> _engine.SolveOptions:
     core.elements_per_edge = options.elements_per_edge
     core.patch_samples = _engine.GatherSamples(options.patch_rays, options.patch_opening_rays)
     core.node_samples = _engine.GatherSamples(options.node_rays, options.node_opening_rays)
-    core.node_spacing = options.node_spacing
+    core.node_tolerance = options.node_tolerance
     core.tolerance = options.tolerance
     core.seed = options.seed
     core.trace = trace

@@ -3,6 +3,7 @@
 
 #include <glm/glm.hpp>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -34,8 +35,8 @@ struct SolveOptions {
   int elements_per_edge = 4;      ///< a patch has the square of it
   GatherSamples patch_samples{512, 128};
   GatherSamples node_samples{1024, 256};
-  float node_spacing = 6;   ///< of nodes, against the harmonic mean distance of what a cell sees
-  double tolerance = 1e-4;  ///< flux in flight at which interreflection stops, relative
+  float node_tolerance = 0.06f;  ///< relative error of interpolated light from which on nodes are added; infinity: none
+  double tolerance = 1e-4;       ///< flux in flight at which interreflection stops, relative
   std::uint32_t seed = 1;
   bool trace = false;
 };
@@ -122,6 +123,11 @@ class Engine {
   const DirectLight& direct_light() const { return *direct_light_; }
   glm::vec3 reflectance(int face, Side side) const;
 
+  /// The points at which light is gathered to be shown; none with kClassic. Those at corners of cells come first.
+  std::span<const Node> nodes() const {
+    return nodes_ ? std::span<const Node>(nodes_->nodes()) : std::span<const Node>();
+  }
+
   /// What speaks for the light at a point of a face: nodes around it, or else its patch. Numbers are those of
   /// `shown_radiance`. Empty where the side takes no part.
   NodeShares shown_at(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const;
@@ -141,8 +147,15 @@ class Engine {
   void mark_interior(const std::vector<GatherRow>& rows);
   void check_closed(const std::vector<GatherRow>& rows);
   void assemble_transfer(std::vector<GatherRow>& rows);
-  std::vector<int> cell_divisions(const std::vector<GatherRow>& rows) const;
-  void gather_nodes(const std::vector<int>& divisions);
+  struct TrialLight;
+  struct NodeTrial;
+  std::vector<TrialLight> trial_lights() const;
+  void gather_new_nodes(NodeTrial& trial, int first_part);
+  std::vector<Share> near_elements(const Node& node, const std::vector<Share>& elements) const;
+  void resolve_near_light(const NodeTrial& trial);
+  bool is_worth_a_look(const NodeTrial& trial, int part, int level, float tolerance) const;
+  bool is_to_be_divided(const NodeTrial& trial, int part, int level, float tolerance) const;
+  void gather_nodes();
   void solve_classic();
   void show_classic();
   std::vector<Share> to_patches(const std::vector<Share>& elements) const;
@@ -177,6 +190,7 @@ class Engine {
   // Where light is shown.
   std::unique_ptr<NodeField> nodes_;
   SparseRows node_sky_, node_patches_;
+  SparseRows node_near_;  // what the nodes, then the patches, send close by: those with their weights, less these
   std::unique_ptr<PointLinks> links_;
 
   // Light that no condition changes: of point sources on elements, and its first reflection, with small emitters, at
