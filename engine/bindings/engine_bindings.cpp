@@ -175,7 +175,7 @@ NB_MODULE(_engine, m) {
       .def_rw("patch_samples", &SolveOptions::patch_samples)
       .def_rw("node_samples", &SolveOptions::node_samples)
       .def_rw("panel_rays", &SolveOptions::panel_rays)
-      .def_rw("node_spacing", &SolveOptions::node_spacing)
+      .def_rw("node_tolerance", &SolveOptions::node_tolerance)
       .def_rw("tolerance", &SolveOptions::tolerance)
       .def_rw("seed", &SolveOptions::seed)
       .def_rw("trace", &SolveOptions::trace);

@@ -18,9 +18,7 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr std::size_t kGrain = 8;
-constexpr double kConnectedShare = 0.05;   // emitters up to this share of the interior's area are connected, not hit
-constexpr float kLeastDividedSize = 0.5f;  // of the longest edge of patches: smaller cells are fine enough as they are
-constexpr float kExposedNode = 0.5f;       // a node counts when at least this share of its rays is outside solids
+constexpr double kConnectedShare = 0.05;  // emitters up to this share of the interior's area are connected, not hit
 
 }  // namespace
 
@@ -78,6 +76,7 @@ void Engine::solve(const Engine* solved) {
     const TracePhase phase(trace_, "forward rays");
     solve_classic();
   } else {
+    lit_by_sources_ = direct_light_->deposit({}, receivers_, hash_seed(options_.seed, kBeamStream));
     {
       const TracePhase phase(trace_, "nodes");
       gather_nodes(known);
@@ -183,135 +182,6 @@ void Engine::assemble_transfer(const Known& known) {
   facts_.cluster_count = interreflection_->cluster_count();
 }
 
-// Cells are divided where the harmonic mean distance of what they see is short against their size: there irradiance
-// changes within the cell [after Ward & Heckbert 1992].
-std::vector<int> Engine::cell_divisions() const {
-  std::vector<int> divisions;
-  for (std::size_t p = 0; p < patch_rows_.size(); ++p) {
-    const float size = std::sqrt(mesh_->slot_area(slot_of_patch_[p]));
-    const float distance = std::max(patch_rows_[p].around->harmonic_distance, 1e-6f * faces_.extent);
-    const float wanted = size / (options_.node_spacing * distance);
-    const bool is_small = size < kLeastDividedSize * facts_.maximum_edge_m;
-    divisions.push_back(is_small ? 1 : wanted > 2 ? 4 : wanted > 1 ? 2 : 1);
-  }
-  return divisions;
-}
-
-// Nodes in the order of slots, so that it does not depend on the way in which patches are found.
-void Engine::gather_nodes(Known& known) {
-  const std::vector<int> divisions = cell_divisions();
-  std::vector<std::pair<int, int>> cells;  // slot, divisions
-  for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)
-    if (patch_reflectance_[p] != glm::vec3(0) && !mesh_->is_cluster(slot_of_patch_[p]))  // a cluster shows its patch
-      cells.push_back({slot_of_patch_[p], divisions[p]});
-  std::sort(cells.begin(), cells.end());
-  std::vector<int> slots, slot_divisions;
-  for (const auto& [slot, division] : cells) {
-    slots.push_back(slot);
-    slot_divisions.push_back(division);
-  }
-  nodes_ = std::make_unique<NodeField>(*mesh_, *rays_, slots, slot_divisions);
-  facts_.node_count = static_cast<int>(nodes_->nodes().size());
-  find_known_nodes(known);
-  facts_.kept_node_rows =
-      static_cast<int>(std::count_if(known.node.begin(), known.node.end(), [](int node) { return node >= 0; }));
-  const bool is_the_same = known.has_same_nodes && known.has_same_patches;
-  node_rows_ = is_the_same ? known.engine->node_rows_ : node_rows(known);
-  if (is_the_same && known.has_openings) {
-    node_sky_ = known.engine->node_sky_;
-    node_through_ = known.engine->node_through_;
-  } else {
-    look_out_of_nodes(known);
-  }
-  std::vector<char> is_exposed;
-  for (const float exposure : node_rows_->exposure) is_exposed.push_back(exposure >= kExposedNode);
-  nodes_->finish(std::move(is_exposed));
-}
-
-// Which nodes the other engine had, if it had all patches of this one: else it left out what they are seen by.
-void Engine::find_known_nodes(Known& known) const {
-  const std::vector<Node>& nodes = nodes_->nodes();
-  known.node.assign(nodes.size(), -1);
-  if (!known.has_surroundings || !known.engine->nodes_ ||
-      !std::all_of(slot_of_patch_.begin(), slot_of_patch_.end(),
-                   [&](int slot) { return known.engine->patch_of_slot_[slot] >= 0; }))
-    return;
-  const std::vector<Node>& others = known.engine->nodes_->nodes();
-  std::unordered_multimap<std::uint32_t, int> number;
-  for (std::size_t i = 0; i < others.size(); ++i) number.emplace(node_seed(others[i]), static_cast<int>(i));
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    const auto [first, last] = number.equal_range(node_seed(nodes[i]));
-    for (auto entry = first; entry != last; ++entry)
-      if (others[entry->second] == nodes[i]) known.node[i] = entry->second;
-  }
-  known.has_same_nodes = nodes == others;
-}
-
-std::shared_ptr<const Engine::NodeRows> Engine::node_rows(const Known& known) const {
-  const std::vector<Node>& nodes = nodes_->nodes();
-  std::vector<GatherRow> rows(nodes.size());
-  parallel_indices(nodes.size(), kGrain, [&](std::size_t i) {
-    if (known.node[i] >= 0) {
-      const auto other = static_cast<std::size_t>(known.node[i]);
-      const NodeRows& known_rows = *known.engine->node_rows_;
-      rows[i].reached = known_rows.patches.row(other);
-      for (Share& share : rows[i].reached) share.index = known.engine->slot_of_patch_[share.index];
-      rows[i].reached = to_patches(rows[i].reached);
-      rows[i].sky = known_rows.sky.row(other);
-      rows[i].exposure = known_rows.exposure[other];
-    } else {
-      rows[i] = gatherer_->surroundings_of_point(nodes[i], options_.node_samples, node_seed(nodes[i]));
-      rows[i].reached = to_patches(rows[i].reached);
-    }
-  });
-  auto found = std::make_shared<NodeRows>();
-  for (const GatherRow& row : rows) {
-    found->exposure.push_back(row.exposure);
-    found->patches.append(row.reached);
-    found->sky.append(row.sky);
-  }
-  return found;
-}
-
-// What nodes see through openings.
-void Engine::look_out_of_nodes(const Known& known) {
-  const std::vector<Node>& nodes = nodes_->nodes();
-  std::vector<GatherRow> rows(nodes.size());
-  parallel_indices(nodes.size(), kGrain, [&](std::size_t i) {
-    GatherRow& row = rows[i];
-    if (known.node[i] >= 0 && known.has_openings && known.has_same_patches) {
-      row.sky = known.engine->node_sky_.row(static_cast<std::size_t>(known.node[i]));
-      row.through = known.engine->node_through_.row(static_cast<std::size_t>(known.node[i]));
-      return;
-    }
-    row.exposure = node_rows_->exposure[i];
-    row.sky = node_rows_->sky.row(i);
-    gatherer_->look_through_openings(nodes[i], options_.node_samples, node_seed(nodes[i]), row);
-    row.through = to_patches(row.through);
-  });
-  for (const GatherRow& row : rows) {
-    node_sky_.append(row.sky);
-    node_through_.append(row.through);
-  }
-}
-
-void Engine::link_nodes(const Known& known) {
-  links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes());
-  PointLinks::Known known_links;
-  if (known.has_surroundings && known.engine->links_)
-    known_links = {known.engine->links_.get(), known.node, known.has_same_nodes, known.has_openings};
-  links_->prepare(beam_slots(), known_links);
-  facts_.link_bytes = links_->byte_count();
-}
-
-// Samples of a node depend on where it is alone, so that another object in the room does not change them.
-std::uint32_t Engine::node_seed(const Node& node) const {
-  std::uint32_t seed = hash_seed(options_.seed, kNodeStream);
-  for (const glm::vec3 v : {node.position, node.normal})
-    for (int axis = 0; axis < 3; ++axis) seed = hash_seed(seed, std::bit_cast<std::uint32_t>(v[axis]));
-  return seed;
-}
-
 // Patches that a beam may light: they see some of the sky.
 std::vector<int> Engine::beam_slots() const {
   const int ground = sky_index_->count() - 1;
@@ -328,7 +198,6 @@ std::vector<int> Engine::beam_slots() const {
 
 void Engine::light_always() {
   const int per_slot = mesh_->elements_per_slot();
-  lit_by_sources_ = direct_light_->deposit({}, receivers_, hash_seed(options_.seed, kBeamStream));
   bright_always_ = bright_elements(lit_by_sources_);
   if (connects_emitters_)
     for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)

@@ -133,6 +133,19 @@ void Engine::gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& f
     lighting.node_indirect[i] =
         first_reflection[i] + glm::vec3(node_rows_->patches.dot(i, radiosity) + node_through_.dot(i, radiosity));
   });
+  // What is seen close by is not as even as its patch: the nodes on it, as they are now, speak for it.
+  std::vector<glm::vec4> sent(first_reflection.size());
+  parallel_indices(sent.size(), 64, [&](std::size_t i) {
+    const int face = nodes_->surface(i) / 2;
+    const glm::vec3 emitted = kPi * scene_.materials[faces_.faces[face].material].luminance;
+    sent[i] =
+        glm::vec4((connects_emitters_ ? glm::vec3(0) : emitted) +
+                      reflectance(face, nodes_->surface(i) % 2) * (lighting.node_sky[i] + lighting.node_indirect[i]),
+                  0);
+  });
+  sent.insert(sent.end(), radiosity.begin(), radiosity.end());
+  parallel_indices(first_reflection.size(), 64,
+                   [&](std::size_t i) { lighting.node_indirect[i] += glm::vec3(node_near_.dot(i, sent)); });
 }
 
 std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Lighting* previous,

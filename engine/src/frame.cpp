@@ -147,8 +147,7 @@ void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const
       const glm::vec3 normal = engine_.faces().faces[centre.surface / 2].normal;
       const float height_of_plane = glm::dot(centre.position - eye, normal);
       for (int k = 0; k < s * s; ++k) {
-        const glm::vec3 direction =
-            camera.direction(glm::vec2(x, y) + (glm::vec2(k % s, k / s) + 0.5f) / static_cast<float>(s));
+        const glm::vec3 direction = camera.direction(glm::vec2(x, y) + sample_place(k, s));
         BeamPoint& point = points.emplace_back(centre);
         point.position = eye + direction * (height_of_plane / glm::dot(direction, normal));
         point.sample = k;
@@ -170,7 +169,8 @@ void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const
   }
 }
 
-// Light of sky and of surfaces, between nodes. Extrapolation beyond the outermost nodes never makes it negative.
+// Light of sky and of surfaces, between nodes. Extrapolation beyond the outermost nodes never makes it or a part of it
+// negative.
 void FrameRenderer::add_smooth_light(const ViewSamples& samples, const Lighting& lighting, bool components,
                                      Frame& frame) const {
   const std::size_t pixel_count = samples.centre.size();
@@ -185,13 +185,14 @@ void FrameRenderer::add_smooth_light(const ViewSamples& samples, const Lighting&
       of_sky += share.weight * sky[share.index];
       if (components) of_surfaces += share.weight * indirect[share.index];
     }
-    of_sky = glm::max(of_sky, glm::vec4(0));
+    const glm::vec4 sum = glm::max(of_sky + of_surfaces, glm::vec4(0));
     if (!components) {
-      frame.radiance[p] = glm::vec3(of_sky);
+      frame.radiance[p] = glm::vec3(sum);
       return;
     }
+    of_sky = glm::clamp(of_sky, glm::vec4(0), sum);
     frame.sky[p] = glm::vec3(of_sky);
-    frame.indirect[p] = glm::vec3(glm::max(of_surfaces, glm::vec4(0)));
+    frame.indirect[p] = glm::vec3(sum - of_sky);
   });
 }
 

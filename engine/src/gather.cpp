@@ -13,6 +13,7 @@ namespace {
 constexpr int kBlock = 64;                  // rays traced together
 constexpr double kSmallSolidAngle = 2e-3;   // below it a triangle is sampled by area [sr]
 constexpr int kMinimumRaysPerTriangle = 4;  // towards an opening triangle above the horizon
+constexpr float kNearPatch = 2;             // diameters of a patch up to which its elements are told apart
 constexpr float kPi = std::numbers::pi_v<float>;
 
 }  // namespace
@@ -32,6 +33,10 @@ void merge_shares(std::vector<Share>& shares) {
 Gatherer::Gatherer(const LightMesh& mesh, const RayScene& rays, const std::vector<Material>& materials,
                    const std::vector<OpeningGroup>& openings, const SkyBinIndex& sky, const Panels& panels)
     : mesh_(mesh), rays_(rays), materials_(materials), openings_(openings), sky_(sky), panels_(panels) {
+  // Clusters have no nodes that could tell their elements apart.
+  near_distance_.assign(static_cast<std::size_t>(mesh.slot_count()), 0.f);
+  for (int slot = 0; slot < mesh.slot_count() && !mesh.is_cluster(slot); ++slot)
+    near_distance_[static_cast<std::size_t>(slot)] = kNearPatch * std::sqrt(2 * mesh.slot_area(slot));
   const std::vector<Face>& faces = mesh.faces().faces;
   for (std::size_t f = 0; f < faces.size(); ++f) {
     if (materials[faces[f].material].opening < 0) continue;
@@ -43,7 +48,8 @@ Gatherer::Gatherer(const LightMesh& mesh, const RayScene& rays, const std::vecto
 }
 
 template <typename OriginOf>
-void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, GatherRow& row) const {
+void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, bool tells_near,
+                                 GatherRow& row) const {
   const SobolSequence points(seed);
   const std::vector<std::uint32_t>& order = coherent_order(count);
   Ray rays[kBlock];
@@ -71,7 +77,10 @@ void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint
       } else if (mesh_.faces().is_inside_solid(hits[i].face, hits[i].side)) {
         ++buried;
       } else {
-        slots.push_back(mesh_.slot_at(hits[i]));
+        const int slot = mesh_.slot_at(hits[i]);
+        slots.push_back(slot);
+        if (tells_near && hits[i].t < near_distance_[static_cast<std::size_t>(slot)])
+          row.near.push_back({mesh_.element_at(hits[i]), 1});
         inverse_distance += 1 / std::max(hits[i].t, mesh_.faces().ray_offset());
       }
     }
@@ -86,6 +95,8 @@ void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint
     row.reached.push_back({*first, share * static_cast<float>(last - first)});
     first = last;
   }
+  merge_shares(row.near);
+  for (Share& near : row.near) near.weight *= share;
   for (const int bin : open_bins) row.sky.push_back({bin, kPi * share});
   row.escaped = static_cast<float>(escaped) * share;
   row.harmonic_distance = inverse_distance > 0 ? static_cast<float>(exposed / inverse_distance) : Ray::kInfinity;
@@ -199,7 +210,11 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
 
 GatherRow Gatherer::surroundings_of_point(const Node& point, GatherSamples samples, std::uint32_t seed) const {
   GatherRow row;
-  gather_hemisphere([&](glm::vec2) { return Origin{point.position, point.normal}; }, samples.hemisphere, seed, row);
+  gather_hemisphere(
+      [&](glm::vec2) {
+        return Origin{point.position, point.normal};
+      },
+      samples.hemisphere, seed, true, row);
   return row;
 }
 
@@ -221,7 +236,7 @@ auto Gatherer::places_on(int slot) const {
 
 GatherRow Gatherer::surroundings_of_patch(int slot, GatherSamples samples, std::uint32_t seed) const {
   GatherRow row;
-  gather_hemisphere(places_on(slot), samples.hemisphere, seed, row);
+  gather_hemisphere(places_on(slot), samples.hemisphere, seed, false, row);
   return row;
 }
 

@@ -41,9 +41,9 @@ class SolveOptions:
     maximum_edge_m: of a patch [m]; 0 chooses it from target_patch_count. elements_per_edge: a patch has its square.
     patch_rays, patch_opening_rays: rays a patch, over the hemisphere and towards the openings; node_*: the same for
     each point at which light is shown (a node). panel_rays: rays from each panel of a glazing product outwards, for
-    each of its incident bins. node_spacing: of nodes, against the harmonic mean distance of what
-    their cell sees: smaller values put more nodes into corners and under furniture. tolerance: relative flux in flight
-    at which interreflection stops. seed: of all samples.
+    each of its incident bins. node_tolerance: relative error of interpolated light from which on nodes are added;
+    smaller values put more of them into corners and under furniture. tolerance: relative flux in flight at which
+    interreflection stops. seed: of all samples.
     """
 
     method: Method = "gather"
@@ -55,7 +55,7 @@ class SolveOptions:
     node_rays: int = 1024
     node_opening_rays: int = 256
     panel_rays: int = 256
-    node_spacing: float = 6.0
+    node_tolerance: float = 0.06
     tolerance: float = 1e-4
     seed: int = 1
 
@@ -409,7 +409,7 @@ def _core_options(options: SolveOptions, trace: bool) -> _engine.SolveOptions:
     core.patch_samples = _engine.GatherSamples(options.patch_rays, options.patch_opening_rays)
     core.node_samples = _engine.GatherSamples(options.node_rays, options.node_opening_rays)
     core.panel_rays = options.panel_rays
-    core.node_spacing = options.node_spacing
+    core.node_tolerance = options.node_tolerance
     core.tolerance = options.tolerance
     core.seed = options.seed
     core.trace = trace

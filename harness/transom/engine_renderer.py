@@ -22,7 +22,7 @@ class EngineRenderer:
     """Transom's own engine. `version` is raised when its answers may change."""
 
     name = "engine"
-    version = "2"
+    version = "3"
 
     def __init__(self) -> None:
         self._solved: dict[tuple[str, SolveOptions], tuple[Engine, float]] = {}

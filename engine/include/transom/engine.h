@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "transom/classic.h"
@@ -37,9 +38,9 @@ struct SolveOptions {
   int elements_per_edge = 4;      ///< a patch has the square of it
   GatherSamples patch_samples{512, 128};
   GatherSamples node_samples{1024, 256};
-  int panel_rays = 256;     ///< outwards from a panel, for each incident bin
-  float node_spacing = 6;   ///< of nodes, against the harmonic mean distance of what a cell sees
-  double tolerance = 1e-4;  ///< flux in flight at which interreflection stops, relative
+  int panel_rays = 256;          ///< outwards from a panel, for each incident bin
+  float node_tolerance = 0.06f;  ///< relative error of interpolated light from which on nodes are added; infinity: none
+  double tolerance = 1e-4;       ///< flux in flight at which interreflection stops, relative
   std::uint32_t seed = 1;
   bool trace = false;
 };
@@ -120,6 +121,11 @@ class Engine {
   const Panels& panels() const { return *panels_; }
   glm::vec3 reflectance(int face, Side side) const;
 
+  /// The points at which light is gathered to be shown; none with kClassic. Those at corners of cells come first.
+  std::span<const Node> nodes() const {
+    return nodes_ ? std::span<const Node>(nodes_->nodes()) : std::span<const Node>();
+  }
+
   /// What speaks for the light at a point of a face: nodes around it, or else its patch. Numbers are those of
   /// `shown_radiance`. Empty where the side takes no part.
   NodeShares shown_at(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const;
@@ -135,11 +141,12 @@ class Engine {
   /// What an engine of an earlier state of the scene found, as far as it is valid.
   struct Known {
     const Engine* engine = nullptr;
-    bool has_surroundings = false;  // faces and their cells are the same
-    bool has_openings = false;      // and so is all glazing
-    bool has_same_patches = false;  // with the same numbers
-    bool has_same_nodes = false;    // with the same numbers
-    std::vector<int> node;          // its number of each node here, or -1
+    bool has_surroundings = false;                              // faces and their cells are the same
+    bool has_openings = false;                                  // and so is all glazing
+    bool has_same_patches = false;                              // with the same numbers
+    bool has_same_nodes = false;                                // with the same numbers
+    std::unordered_multimap<std::uint32_t, int> nodes_by_seed;  // if they have seen all patches of this engine
+    std::vector<int> node;                                      // its number of each node here, or -1
   };
   /// What a patch sees, by slot: without looking through openings; and through them, with all of the sky.
   struct PatchRow {
@@ -148,7 +155,8 @@ class Engine {
   /// What nodes see without looking through openings: patches, and the sky seen by itself.
   struct NodeRows {
     SparseRows patches, sky;
-    std::vector<float> exposure;
+    SparseRows near;  // elements of the nearest patches
+    std::vector<float> exposure, harmonic_distance;
   };
 
   void solve(const Engine* solved);
@@ -162,11 +170,16 @@ class Engine {
   void mark_interior();
   void check_closed();
   void assemble_transfer(const Known& known);
-  std::vector<int> cell_divisions() const;
+  struct TrialLight;
+  struct NodeTrial;
+  std::vector<TrialLight> trial_lights() const;
+  GatherRow surroundings_of_node(const Node& node, int known_node, const Known& known) const;
+  void gather_new_nodes(NodeTrial& trial, int first_part, Known& known);
+  void keep_node_rows(NodeTrial& trial, Known& known);
+  void resolve_near_light(const NodeTrial& trial);
+  bool is_worth_a_look(const NodeTrial& trial, int part, int level, float tolerance) const;
+  bool is_to_be_divided(const NodeTrial& trial, int part, int level, float tolerance) const;
   void gather_nodes(Known& known);
-  void find_known_nodes(Known& known) const;
-  std::shared_ptr<const NodeRows> node_rows(const Known& known) const;
-  void look_out_of_nodes(const Known& known);
   void link_nodes(const Known& known);
   std::uint32_t node_seed(const Node& node) const;
   void gather_panels();
@@ -233,6 +246,7 @@ class Engine {
   std::unique_ptr<NodeField> nodes_;
   std::shared_ptr<const NodeRows> node_rows_;
   SparseRows node_sky_, node_through_;  // all of the sky; patches seen through openings
+  SparseRows node_near_;  // what the nodes, then the patches, send close by: those with their weights, less these
   std::unique_ptr<PointLinks> links_;
 
   // Light that no condition changes: of point sources on elements, and its first reflection, with small emitters, at

@@ -33,6 +33,7 @@ struct GatherRow {
   std::vector<Share> through;  ///< slots seen through openings: form factors x transmittance
   /// Sky bins, then the ground, then exit bins of panels (Panels): illuminance per luminance [lx per cd/m²].
   std::vector<Share> sky;
+  std::vector<Share> near;      ///< of a point: elements reached whose patch is near, as `reached` has them by slot
   float escaped = 0;            ///< share of the hemisphere that meets nothing: open sky
   float exposure = 1;           ///< share of the receiver that does not lie inside a solid
   float harmonic_distance = 0;  ///< harmonic mean distance of what is seen [m]
@@ -74,7 +75,8 @@ class Gatherer {
   };
   auto places_on(int slot_index) const;
   template <typename OriginOf>
-  void gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, GatherRow& row) const;
+  void gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, bool tells_near,
+                         GatherRow& row) const;
   template <typename OriginOf>
   void gather_openings(const Origin& middle, const OriginOf& origin_of, int count, std::uint32_t seed,
                        GatherRow& row) const;
@@ -86,6 +88,7 @@ class Gatherer {
   const SkyBinIndex& sky_;
   const Panels& panels_;
   std::vector<OpeningTriangle> opening_triangles_;
+  std::vector<float> near_distance_;  // by slot [m]
 };
 
 /// Adds up the weights of equal indices and sorts by index.

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <glm/glm.hpp>
+#include <unordered_map>
 #include <vector>
 
 #include "transom/light_mesh.h"
@@ -18,42 +20,81 @@ struct NodeShares {
   int count = 0;
 };
 
-/// Nodes at the corners of cells; a cell where light changes within its own size is divided once more and has nodes of
-/// its own. Where something stands between the nodes of a cell, a point asks which of them it sees, so that light does
-/// not leak through walls and partitions.
+/// Nodes at the corners of cells, and of the parts into which cells are divided where light changes within them. Parts
+/// of one side of a face share the nodes that they have in common. Where something stands between the nodes of a part,
+/// a point asks which of them it sees, so that light does not leak through walls and partitions.
+///
+/// Use: make it and say which nodes are exposed; then, as often as wanted, give parts a middle or divide them, and say
+/// the same of the new nodes.
 class NodeField {
  public:
-  /// slots: the cells that need nodes. divisions: of each, 1 (none) or more per edge.
-  NodeField(const LightMesh& mesh, const RayScene& rays, const std::vector<int>& slots,
-            const std::vector<int>& divisions);
+  /// slots: the cells that need nodes. Each begins as one part. thin: width [m] below which light is taken not to
+  /// change across a part.
+  NodeField(const LightMesh& mesh, const RayScene& rays, const std::vector<int>& slots, float thin);
 
   const std::vector<Node>& nodes() const { return nodes_; }
   /// The face that a node lies on, times two, plus the side.
   int surface(std::size_t node) const { return surface_of_node_[node]; }
-
-  /// Leaves out nodes that lie inside solids, and finds the cells that something divides. To be called once.
-  void finish(std::vector<char> node_is_exposed);
+  /// Names the place of a node: another field has the same node where surface and place are equal.
+  std::uint64_t place(std::size_t node) const { return place_of_node_[node]; }
   bool is_exposed(std::size_t node) const { return node_is_exposed_[node]; }
+
+  /// Says of the nodes that have been added since the last call whether they lie outside solids, and finds the parts
+  /// from number `first_part` on that something divides.
+  void expose(const std::vector<char>& is_exposed, int first_part);
+
+  int part_count() const { return static_cast<int>(parts_.size()); }
+  /// Whether something stands between nodes of a part, or one of them lies inside a solid.
+  bool is_split(int part) const { return parts_[part].is_split; }
+  /// Corners of a part: 4, or 3 on a triangle.
+  int corner_count(int part) const { return is_quad(parts_[part]) ? 4 : 3; }
+  const std::array<int, 4>& corners(int part) const { return parts_[part].corner_node; }
+  /// Lengths of a part along its two axes [m].
+  glm::vec2 size(int part) const { return size(parts_[part]); }
+
+  /// Gives a part a node in its middle, between which and the corners light is then interpolated.
+  void add_middle(int part);
+  /// The node in the middle of a part; -1: none.
+  int middle(int part) const { return parts_[part].middle_node; }
+  /// What the corners alone say of the middle.
+  NodeShares predict_middle(int part) const;
+  /// Divides a part: in four, or in two along its longer axis where that is much the longer one.
+  void divide(int part);
 
   /// lifted_point: where the hit is, lifted off its surface.
   NodeShares interpolate(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const;
 
  private:
-  struct CellNodes {
-    int first = -1;     // of its own nodes, or of the nodes of its face's side; -1: takes no part
-    int divisions = 1;  // more than 1: own nodes, (divisions + 1)^2 on a quad
+  /// A quad or triangle of the parameters of a face: corner + a u + b v for its own coordinates (a, b).
+  struct Part {
+    int surface;
+    glm::vec2 corner, u, v;
+    glm::vec2 low{0}, high{1};  // own coordinates of the corner nodes of a quad
+    std::array<int, 4> corner_node{};
+    int middle_node = -1;
+    int first_child = -1;
+    std::uint8_t division = 0;  // of u: bit 0; of v: bit 1
     char is_split = 0;
   };
-  NodeShares around(const CellNodes& cell, int face, CellPoint point) const;
-  Grid own_grid(int face, int divisions) const { return {mesh_.grid(face).is_quad, divisions, divisions}; }
+  bool is_quad(const Part& part) const { return mesh_.grid(part.surface / 2).is_quad; }
+  glm::vec2 size(const Part& part) const;
+  void add_part(int surface, glm::vec2 corner, glm::vec2 u, glm::vec2 v);
+  int node_at(int surface, glm::vec2 st);
+  bool is_parted(const Part& part) const;
+  NodeShares between_corners(const Part& part, glm::vec2 own) const;
+  NodeShares between_middle_and_corners(const Part& part, glm::vec2 own) const;
+  bool keep_visible(glm::vec3 point, NodeShares& shares) const;
 
   const LightMesh& mesh_;
   const RayScene& rays_;
-  std::vector<CellNodes> cells_;  // by slot
-  std::vector<int> slots_;
+  std::vector<int> part_of_slot_;  // -1: takes no part
+  std::vector<Part> parts_;        // children of one part stand together
   std::vector<Node> nodes_;
   std::vector<int> surface_of_node_;
+  std::vector<std::uint64_t> place_of_node_;
   std::vector<char> node_is_exposed_;
+  std::vector<std::unordered_map<std::uint64_t, int>> node_of_place_;  // by surface
+  float thin_;
 };
 
 }  // namespace transom

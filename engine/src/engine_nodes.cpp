@@ -1,0 +1,322 @@
+// The nodes of an engine: where light is gathered to be shown, the more densely the more it changes.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "streams.h"
+#include "transom/engine.h"
+#include "transom/parallel.h"
+#include "transom/sampling.h"
+
+namespace transom {
+namespace {
+
+constexpr std::size_t kGrain = 8;
+constexpr float kExposedNode = 0.5f;  // a node counts when at least this share of its rays is outside solids
+
+constexpr double kTrialTolerance = 1e-3;  // of interreflection
+constexpr int kTrialCycles = 1000;
+constexpr float kSunnySky = 0.25f;  // share of the sky in what makes light indoors, where the sun does the rest
+constexpr float kDark = 0.05f;      // of the mean over nodes: errors below it are not seen
+
+// Parts are divided at most so often, and not when they are shorter than this share of the longest edge of patches.
+constexpr int kLevels = 4;
+constexpr float kFinest = 0.13f;
+constexpr float kThin = 0.12f;        // of that edge: across less, light does not change
+constexpr float kLevelGrowth = 2;     // of the tolerance, from level to level: a smaller part is less of a picture
+constexpr float kSmallness = 0.35f;   // exponent of the same between parts of different area
+constexpr int kBuriedLevels = 2;      // divisions of parts of which nothing can be said but that a solid ends there
+constexpr float kLargeForBuried = 3;  // and the leniency up to which they are
+
+// A part is looked at when light differs between its corners by more than these multiples of the tolerance.
+constexpr float kLookNear = 1.5f, kLookFar = 3, kLookSplit = 0.75f;
+constexpr float kSteep = 6;     // and is divided whatever its middle says: a step may be half up in the middle
+constexpr float kNear = 0.25f;  // length of a part against the distance of what it sees
+
+float mean(glm::vec3 v) {
+  return (v.x + v.y + v.z) / 3;
+}
+
+}  // namespace
+
+/// Some light whose shape at the nodes is that of the light of many conditions.
+struct Engine::TrialLight {
+  std::vector<float> radiosity;  // of patches
+  float sky;                     // luminance
+  std::vector<float> at_nodes;
+  float dark = 0;  // differences are relative to no less
+
+  float of(const NodeShares& shares) const {
+    float sum = 0;
+    for (int k = 0; k < shares.count; ++k) sum += shares.weight[k] * at_nodes[shares.node[k]];
+    return sum;
+  }
+};
+
+/// Nodes as far as they have been gathered.
+struct Engine::NodeTrial {
+  std::vector<GatherRow> rows;
+  std::vector<TrialLight> lights;
+  std::vector<std::vector<Share>> own_sky;  // seen without looking through an opening
+  float longest_edge;
+
+  // Larger for parts that are a smaller part of a picture.
+  float leniency(const NodeField& nodes, int part) const {
+    const glm::vec2 size = nodes.size(part);
+    const float share = size.x * size.y / (longest_edge * longest_edge);
+    return share > 0 ? std::max(1.f, std::pow(share, -kSmallness)) : Ray::kInfinity;
+  }
+
+  // Between the exposed corners of a part, relative to the largest.
+  float difference(const NodeField& nodes, int part) const {
+    float difference = 0;
+    for (const TrialLight& light : lights) {
+      float least = Ray::kInfinity, most = light.dark;
+      for (int k = 0; k < nodes.corner_count(part); ++k) {
+        const int node = nodes.corners(part)[k];
+        if (!nodes.is_exposed(node)) continue;
+        least = std::min(least, std::max(light.at_nodes[node], light.dark));
+        most = std::max(most, light.at_nodes[node]);
+      }
+      if (most > 0) difference = std::max(difference, 1 - least / most);
+    }
+    return difference;
+  }
+};
+
+// An even sky, all of it seen; the same mostly as what it makes surfaces send, which is the shape of what the sun makes
+// them send on the mean over its places; and what lamps do.
+std::vector<Engine::TrialLight> Engine::trial_lights() const {
+  const std::size_t n = slot_of_patch_.size();
+  std::vector<TrialLight> lights;
+  const auto add = [&](const std::vector<glm::vec3>& emitted, const std::vector<glm::vec3>& direct,
+                       std::initializer_list<float> skies) {
+    std::vector<glm::vec3> irradiance;
+    interreflection_->solve({emitted, direct}, kTrialTolerance, kTrialCycles, irradiance);
+    std::vector<float> radiosity(n);
+    for (std::size_t p = 0; p < n; ++p) radiosity[p] = mean(emitted[p] + patch_reflectance_[p] * irradiance[p]);
+    for (const float sky : skies) lights.push_back({radiosity, sky, {}});
+  };
+  std::vector<glm::vec3> from_sky(n, glm::vec3(0)), from_lamps(n, glm::vec3(0));
+  for (std::size_t p = 0; p < n; ++p)
+    for (std::size_t k = patch_sky_.begin[p]; k < patch_sky_.begin[p + 1]; ++k)
+      from_sky[p] += glm::vec3(patch_sky_.entries[k].weight);
+  for (const LitElement& e : lit_by_sources_) {
+    const int per_slot = mesh_->elements_per_slot(), patch = patch_of_slot_[e.element / per_slot];
+    from_lamps[patch] += e.illuminance * element_share_[patch * per_slot + e.element % per_slot];
+  }
+  const auto is_dark = [](const std::vector<glm::vec3>& light) {
+    return std::all_of(light.begin(), light.end(), [](glm::vec3 value) { return value == glm::vec3(0); });
+  };
+  if (!is_dark(from_sky)) add(std::vector<glm::vec3>(n, glm::vec3(0)), from_sky, {1, kSunnySky});
+  if (!is_dark(from_lamps) || !is_dark(patch_emitted_)) add(patch_emitted_, from_lamps, {0});
+  return lights;
+}
+
+// What a node sees without looking through openings, of patches alone; as the other engine knows it, if it does.
+GatherRow Engine::surroundings_of_node(const Node& node, int known_node, const Known& known) const {
+  GatherRow row;
+  if (known_node >= 0) {
+    const auto other = static_cast<std::size_t>(known_node);
+    const NodeRows& rows = *known.engine->node_rows_;
+    row.reached = rows.patches.row(other);
+    for (Share& share : row.reached) share.index = known.engine->slot_of_patch_[share.index];
+    row.sky = rows.sky.row(other);
+    row.near = rows.near.row(other);
+    row.exposure = rows.exposure[other];
+    row.harmonic_distance = rows.harmonic_distance[other];
+  } else {
+    row = gatherer_->surroundings_of_point(node, options_.node_samples, node_seed(node));
+  }
+  row.reached = to_patches(row.reached);
+  std::erase_if(row.near,
+                [&](const Share& share) { return patch_of_slot_[share.index / mesh_->elements_per_slot()] < 0; });
+  return row;
+}
+
+// Gathers at the nodes that have been added. Their samples depend on their places alone.
+void Engine::gather_new_nodes(NodeTrial& trial, int first_part, Known& known) {
+  const std::vector<Node>& nodes = nodes_->nodes();
+  const std::size_t first = trial.rows.size(), count = nodes.size() - first;
+  trial.rows.resize(nodes.size());
+  trial.own_sky.resize(nodes.size());
+  for (TrialLight& light : trial.lights) light.at_nodes.resize(nodes.size());
+  known.node.resize(nodes.size(), -1);
+  std::vector<char> is_exposed(count);
+  parallel_indices(count, kGrain, [&](std::size_t k) {
+    const std::size_t i = first + k;
+    const auto [begin, end] = known.nodes_by_seed.equal_range(node_seed(nodes[i]));
+    for (auto entry = begin; entry != end; ++entry)
+      if (known.engine->nodes_->nodes()[static_cast<std::size_t>(entry->second)] == nodes[i])
+        known.node[i] = entry->second;
+    GatherRow& row = trial.rows[i];
+    row = surroundings_of_node(nodes[i], known.node[i], known);
+    trial.own_sky[i] = row.sky;
+    if (known.node[i] >= 0 && known.has_openings && known.has_same_patches) {
+      row.sky = known.engine->node_sky_.row(static_cast<std::size_t>(known.node[i]));
+      row.through = known.engine->node_through_.row(static_cast<std::size_t>(known.node[i]));
+    } else {
+      gatherer_->look_through_openings(nodes[i], options_.node_samples, node_seed(nodes[i]), row);
+      row.through = to_patches(row.through);
+    }
+    is_exposed[k] = row.exposure >= kExposedNode;
+    float sky = 0;
+    for (const Share& share : row.sky) sky += share.weight;
+    for (TrialLight& light : trial.lights) {
+      light.at_nodes[i] = light.sky * sky;
+      for (const std::vector<Share>* shares : {&row.reached, &row.through})
+        for (const Share& share : *shares) light.at_nodes[i] += share.weight * light.radiosity[share.index];
+    }
+  });
+  nodes_->expose(is_exposed, first_part);
+}
+
+// Close by it matters that the light of a patch is not even: its elements get theirs from the nodes around them.
+void Engine::resolve_near_light(const NodeTrial& trial) {
+  const int per_slot = mesh_->elements_per_slot();
+  const std::size_t node_count = nodes_->nodes().size();
+  std::vector<NodeShares> at_element(slot_of_patch_.size() * static_cast<std::size_t>(per_slot));
+  parallel_indices(slot_of_patch_.size(), kGrain, [&](std::size_t p) {
+    if (mesh_->is_cluster(slot_of_patch_[p])) return;
+    const Slot slot = mesh_->slot(slot_of_patch_[p]);
+    const glm::vec2 middle = mesh_->grid(slot.face).is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3);
+    for (int e = 0; e < per_slot; ++e) {
+      const glm::vec2 st = mesh_->element_parameters(slot.face, slot.cell, e, middle);
+      at_element[p * static_cast<std::size_t>(per_slot) + static_cast<std::size_t>(e)] =
+          nodes_->interpolate(slot.face, slot.side, st, mesh_->lifted_position(slot.face, slot.side, st));
+    }
+  });
+  std::vector<std::vector<Share>> rows(node_count);
+  parallel_indices(node_count, kGrain, [&](std::size_t i) {
+    for (const Share& share : trial.rows[i].near) {
+      const int patch = patch_of_slot_[share.index / per_slot];
+      const NodeShares& nodes = at_element[static_cast<std::size_t>(patch * per_slot + share.index % per_slot)];
+      if (nodes.count == 0) continue;
+      for (int k = 0; k < nodes.count; ++k) rows[i].push_back({nodes.node[k], share.weight * nodes.weight[k]});
+      rows[i].push_back({static_cast<int>(node_count) + patch, -share.weight});
+    }
+    merge_shares(rows[i]);
+  });
+  for (const std::vector<Share>& row : rows) node_near_.append(row);
+}
+
+// Whether light may change within a part otherwise than linearly, so that it is worth a node in its middle.
+bool Engine::is_worth_a_look(const NodeTrial& trial, int part, int level, float tolerance) const {
+  const glm::vec2 size = nodes_->size(part);
+  const float length = std::max(size.x, size.y);
+  if (length < kFinest * trial.longest_edge) return false;
+  const int corner_count = nodes_->corner_count(part);
+  int exposed = 0;
+  float distance = Ray::kInfinity;
+  for (int k = 0; k < corner_count; ++k) {
+    const int node = nodes_->corners(part)[k];
+    if (!nodes_->is_exposed(node)) continue;
+    ++exposed;
+    distance = std::min(distance, trial.rows[node].harmonic_distance);
+  }
+  if (exposed == 0) return level == 0;
+  if (exposed < corner_count) return true;
+  if (level == 0 && length > distance) return true;
+  const float limit = nodes_->is_split(part) ? kLookSplit : length > kNear * distance ? kLookNear : kLookFar;
+  return trial.difference(*nodes_, part) > limit * tolerance * trial.leniency(*nodes_, part);
+}
+
+// Whether the corners of a part are wrong about its middle.
+bool Engine::is_to_be_divided(const NodeTrial& trial, int part, int level, float tolerance) const {
+  const int middle = nodes_->middle(part);
+  const NodeShares predicted = nodes_->is_exposed(middle) ? nodes_->predict_middle(part) : NodeShares{};
+  const float leniency = trial.leniency(*nodes_, part);
+  if (predicted.count == 0) {
+    bool is_any_exposed = nodes_->is_exposed(middle);
+    for (int k = 0; k < nodes_->corner_count(part); ++k) is_any_exposed |= nodes_->is_exposed(nodes_->corners(part)[k]);
+    return is_any_exposed && level < kBuriedLevels && leniency < kLargeForBuried;
+  }
+  if (trial.difference(*nodes_, part) > kSteep * tolerance * leniency) return true;
+  return std::any_of(trial.lights.begin(), trial.lights.end(), [&](const TrialLight& light) {
+    const float found = light.at_nodes[middle];
+    return std::abs(found - light.of(predicted)) > tolerance * leniency * std::max(found, light.dark);
+  });
+}
+
+// Cells begin with nodes at their corners. Where these are wrong about the middle of a part, it is divided: light is
+// tested, not geometry, so that nodes are many where light changes and nowhere else.
+void Engine::gather_nodes(Known& known) {
+  std::vector<int> slots;
+  for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)
+    if (patch_reflectance_[p] != glm::vec3(0) && !mesh_->is_cluster(slot_of_patch_[p]))  // a cluster shows its patch
+      slots.push_back(slot_of_patch_[p]);
+  std::sort(slots.begin(), slots.end());  // not in the order in which patches are found
+  // Rows of the other engine are of use if it had all patches of this one: else it left out what they are seen by.
+  if (known.has_surroundings && known.engine->nodes_ &&
+      std::all_of(slot_of_patch_.begin(), slot_of_patch_.end(),
+                  [&](int slot) { return known.engine->patch_of_slot_[slot] >= 0; }))
+    for (std::size_t i = 0; i < known.engine->nodes_->nodes().size(); ++i)
+      known.nodes_by_seed.emplace(node_seed(known.engine->nodes_->nodes()[i]), static_cast<int>(i));
+  const float edge = facts_.maximum_edge_m;
+  nodes_ = std::make_unique<NodeField>(*mesh_, *rays_, slots, kThin * edge);
+  NodeTrial trial{{}, trial_lights(), {}, edge};
+  gather_new_nodes(trial, 0, known);
+  for (TrialLight& light : trial.lights) {
+    double sum = 0, count = 0;
+    for (std::size_t i = 0; i < light.at_nodes.size(); ++i)
+      if (nodes_->is_exposed(i)) {
+        sum += light.at_nodes[i];
+        ++count;
+      }
+    light.dark = kDark * static_cast<float>(sum / std::max(1.0, count));
+  }
+  float tolerance = options_.node_tolerance;
+  for (int level = 0, first_part = 0; level < kLevels; ++level, tolerance *= kLevelGrowth) {
+    const int last_part = nodes_->part_count();
+    std::vector<int> looked_at;
+    for (int part = first_part; part < last_part; ++part)
+      if (is_worth_a_look(trial, part, level, tolerance)) looked_at.push_back(part);
+    for (const int part : looked_at) nodes_->add_middle(part);
+    gather_new_nodes(trial, first_part, known);
+    for (const int part : looked_at)
+      if (is_to_be_divided(trial, part, level, tolerance)) nodes_->divide(part);
+    gather_new_nodes(trial, last_part, known);
+    first_part = last_part;
+  }
+  resolve_near_light(trial);
+  keep_node_rows(trial, known);
+}
+
+// Moves what the nodes have seen to where relighting and later edits look for it.
+void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
+  facts_.node_count = static_cast<int>(trial.rows.size());
+  facts_.kept_node_rows =
+      static_cast<int>(std::count_if(known.node.begin(), known.node.end(), [](int node) { return node >= 0; }));
+  known.has_same_nodes = !known.nodes_by_seed.empty() && nodes_->nodes() == known.engine->nodes_->nodes();
+  const auto found = std::make_shared<NodeRows>();
+  for (std::size_t i = 0; i < trial.rows.size(); ++i) {
+    const GatherRow& row = trial.rows[i];
+    found->patches.append(row.reached);
+    found->sky.append(trial.own_sky[i]);
+    found->near.append(row.near);
+    found->exposure.push_back(row.exposure);
+    found->harmonic_distance.push_back(row.harmonic_distance);
+    node_sky_.append(row.sky);
+    node_through_.append(row.through);
+  }
+  node_rows_ = found;
+}
+
+void Engine::link_nodes(const Known& known) {
+  links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes());
+  PointLinks::Known known_links;
+  if (known.has_surroundings && known.engine->links_)
+    known_links = {known.engine->links_.get(), known.node, known.has_same_nodes, known.has_openings};
+  links_->prepare(beam_slots(), known_links);
+  facts_.link_bytes = links_->byte_count();
+}
+
+// Samples of a node depend on where it is alone, so that another object in the room does not change them.
+std::uint32_t Engine::node_seed(const Node& node) const {
+  std::uint32_t seed = hash_seed(options_.seed, kNodeStream);
+  for (const glm::vec3 v : {node.position, node.normal})
+    for (int axis = 0; axis < 3; ++axis) seed = hash_seed(seed, std::bit_cast<std::uint32_t>(v[axis]));
+  return seed;
+}
+
+}  // namespace transom

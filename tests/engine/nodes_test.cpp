@@ -1,0 +1,132 @@
+// Where light is gathered to be shown, and what is shown between.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "rooms.h"
+#include "transom/frame.h"
+#include "transom/view_samples.h"
+
+namespace transom {
+namespace {
+
+using test::add_box;
+using test::roof_light_room;
+using test::tregenza;
+using test::uniform_sky;
+
+constexpr float kPi = 3.14159265f;
+
+/// A desk's slab, 0.04 m thick, 0.3 m above the floor under the roof light, against no wall.
+SceneGeometry room_with_slab() {
+  SceneGeometry scene = roof_light_room(0.5f);
+  add_box(scene, {1.2, 1.5, 0.3}, {2.4, 2.3, 0.34}, 0);
+  return scene;
+}
+
+SolveOptions options(float node_tolerance) {
+  SolveOptions options;
+  options.target_patch_count = 800;
+  options.patch_samples = {256, 64};
+  options.node_samples = {512, 256};
+  options.node_tolerance = node_tolerance;
+  return options;
+}
+
+/// Points of the floor on a line that passes under the slab.
+std::vector<glm::dvec3> below_and_beside_the_slab() {
+  std::vector<glm::dvec3> points;
+  for (double x = 0.65; x < 3; x += 0.07) points.push_back({x, 1.83, 0});
+  return points;
+}
+
+/// Relative differences of the luminance shown of the floor from what is gathered there, without any node between.
+std::vector<double> errors_on_floor(const SceneGeometry& scene, float node_tolerance) {
+  const Engine engine(scene, tregenza(), options(node_tolerance));
+  const auto light = engine.relight(uniform_sky(1000));
+  const std::vector<glm::dvec3> points = below_and_beside_the_slab();
+  const std::vector<Irradiance> gathered =
+      test::illuminance(engine, *light, points, std::vector<glm::vec3>(points.size(), {0, 0, 1}), {4096, 2048});
+  std::vector<glm::vec4> sky, indirect;
+  engine.shown_radiance(*light, sky, indirect);
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const glm::vec3 above = glm::vec3(points[i] - engine.faces().origin) + glm::vec3(0, 0, 0.05f);
+    const Ray down{above, {0, 0, -1}};
+    Hit hit;
+    engine.rays().intersect(RayScene::What::kOpaque, {&down, 1}, {&hit, 1});
+    const NodeShares shares =
+        engine.shown_at(hit.face, hit.side, hit.st, engine.mesh().lifted_position(hit.face, hit.side, hit.st));
+    double shown = 0;
+    for (int k = 0; k < shares.count; ++k)
+      shown += shares.weight[k] * (sky[shares.node[k]].y + indirect[shares.node[k]].y);
+    const double truth = 0.5 / kPi * (gathered[i].sky.y + gathered[i].indirect.y);
+    errors.push_back(shown / truth - 1);
+  }
+  return errors;
+}
+
+double mean_size(const std::vector<double>& errors) {
+  double sum = 0;
+  for (const double error : errors) sum += std::abs(error);
+  return sum / static_cast<double>(errors.size());
+}
+
+TEST(Nodes, AContactShadowIsShownAsItIsGathered) {
+  const std::vector<double> errors = errors_on_floor(room_with_slab(), SolveOptions{}.node_tolerance);
+  // Light falls by 60 % within 10 cm, across a third of a cell.
+  EXPECT_LT(mean_size(errors), 0.03);
+  for (const double error : errors) EXPECT_LT(std::abs(error), 0.15);
+}
+
+TEST(Nodes, WithoutAddedNodesAContactShadowIsNotShown) {
+  EXPECT_GT(mean_size(errors_on_floor(room_with_slab(), std::numeric_limits<float>::infinity())), 0.04);
+}
+
+TEST(Nodes, AreAddedAroundASlabAndNotInTheRestOfTheRoom) {
+  Engine empty(roof_light_room(0.5f), tregenza(), options(0.06f));
+  Engine furnished(room_with_slab(), tregenza(), options(0.06f));
+  std::size_t added_far = 0, added_near = 0;
+  const auto is_near = [](glm::vec3 place) {
+    return place.x > 0.5f && place.x < 3.1f && place.y > 0.8f && place.y < 3;
+  };
+  for (const auto& [engine, sign] : {std::pair<Engine*, int>{&furnished, 1}, {&empty, -1}})
+    for (const Node& node : engine->nodes()) {
+      const glm::vec3 place = node.position + glm::vec3(engine->faces().origin);
+      if (place.z < 0.4f) (is_near(place) ? added_near : added_far) += static_cast<std::size_t>(sign);
+    }
+  EXPECT_GT(added_near, 4 * added_far);
+}
+
+TEST(Nodes, OfAPlaceAreTheSameWhateverElseIsDivided) {
+  Engine coarse(roof_light_room(0.5f), tregenza(), options(0.1f)),
+      fine(roof_light_room(0.5f), tregenza(), options(0.02f));
+  const auto coarse_light = coarse.relight(uniform_sky(1000)), fine_light = fine.relight(uniform_sky(1000));
+  ASSERT_LT(coarse.nodes().size(), fine.nodes().size());
+  // The corners of cells come first, and have the same samples.
+  for (std::size_t i = 0; i < 200; ++i) {
+    EXPECT_EQ(coarse.nodes()[i].position, fine.nodes()[i].position);
+    EXPECT_EQ(coarse_light->node_sky[i], fine_light->node_sky[i]);
+  }
+}
+
+TEST(Frame, SamplesOfAPixelFindAnEdgeAlongAnAxisToOneOfTheirNumber) {
+  for (const int n : {1, 2, 3, 4, 8}) {
+    std::set<int> columns, rows, squares;
+    for (int k = 0; k < n * n; ++k) {
+      const glm::vec2 place = sample_place(k, n);
+      columns.insert(static_cast<int>(place.x * static_cast<float>(n * n)));
+      rows.insert(static_cast<int>(place.y * static_cast<float>(n * n)));
+      squares.insert(static_cast<int>(place.y * static_cast<float>(n)) * n +
+                     static_cast<int>(place.x * static_cast<float>(n)));
+    }
+    EXPECT_EQ(columns.size(), static_cast<std::size_t>(n * n));
+    EXPECT_EQ(rows.size(), static_cast<std::size_t>(n * n));
+    EXPECT_EQ(squares.size(), static_cast<std::size_t>(n * n));
+  }
+}
+
+}  // namespace
+}  // namespace transom
