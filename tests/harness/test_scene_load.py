@@ -248,3 +248,13 @@ def test_missing_scene_root_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TRANSOM_SCENES", "/nonexistent/scenes")
     with pytest.raises(InputError, match="TRANSOM_SCENES = '/nonexistent/scenes' is not a folder"):
         list_scenes()
+
+
+def test_the_key_of_a_scene_does_not_hang_on_the_last_bit_of_its_normals() -> None:
+    scene = load_scene("deflector_house")
+    normals = scene.mesh.corner_normals
+    assert normals is not None
+    nudged = replace(scene.mesh, corner_normals=np.nextafter(normals, 2.0))
+    turned = replace(scene.mesh, corner_normals=np.roll(normals, 1, axis=2))
+    assert content_key(replace(scene, mesh=nudged)) == content_key(scene)
+    assert content_key(replace(scene, mesh=turned)) != content_key(scene)

@@ -14,6 +14,9 @@ from transom.scene.model import Scene
 KEY_FORMAT = 1
 """Raised when the same scene would hash differently."""
 
+NORMAL_STEPS = 2**24
+"""Parts of 1 to which shading normals count: processors differ in the last bit of the angles that weight them."""
+
 
 def content_key(scene: Scene) -> str:
     """SHA-256 (64 hex digits) of geometry, shading normals, materials, openings and point sources.
@@ -33,7 +36,8 @@ def content_key(scene: Scene) -> str:
         if array is None:
             continue
         # Adding zero turns -0.0 into 0.0, which is the same place.
-        plain = np.ascontiguousarray(array + 0, dtype=np.dtype(kind))
+        exact = np.rint(array * NORMAL_STEPS) / NORMAL_STEPS if name == "corner_normals" else array
+        plain = np.ascontiguousarray(exact + 0, dtype=np.dtype(kind))
         digest.update(f"{name}{plain.shape}".encode())
         digest.update(plain.tobytes())
     lights = {
