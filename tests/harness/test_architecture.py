@@ -61,6 +61,7 @@ ENGINE_MAY_INCLUDE = {
         "chrono",
         "cmath",
         "concepts",
+        "condition_variable",
         "cstddef",
         "cstdint",
         "cstdio",
