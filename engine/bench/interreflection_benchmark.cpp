@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "transom/interreflection.h"
 #include "transom/sampling.h"
