@@ -28,7 +28,7 @@ def lobes(
     evaluate: Annotated[bool, typer.Option("--evaluate", help="Measure fractions and errors; all products.")] = False,
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="OUT.json", help="Of --evaluate: figures go beside it.")
-    ] = Path("build/lobes.json"),
+    ] = Path("build/lobes/evaluation.json"),
     rays: Annotated[int, typer.Option(help="Of the second tracer, for each sun.", min=64, max=65536)] = 1024,
     every: Annotated[int, typer.Option(help="Leave out each such incident direction in turn.", min=1)] = 3,
 ) -> None:
@@ -40,7 +40,7 @@ def lobes(
 
     \b
     Example:  transom lobes "prismatic_panel(angle_low=30)" --sun 45,20
-              transom lobes --evaluate -o build/lobes.json
+              transom lobes --evaluate -o build/lobes/evaluation.json
     """
     if evaluate:
         _evaluate(products or [], output, rays, every)
