@@ -134,13 +134,13 @@ NB_MODULE(_engine, m) {
       .def(
           "add_panels",
           [](SceneGeometry& s, In<float, nb::shape<3, 3>> axes, In<float, nb::ndim<1>> polar_edges,
-             In<int, nb::ndim<1>> counts) {
+             In<int, nb::ndim<1>> counts, float diffuse_reflectance) {
             const std::vector<glm::vec3> rows = to_vector<glm::vec3>(axes);
-            s.openings.push_back({std::vector<float>(2, 0.f), 0.f,
+            s.openings.push_back({std::vector<float>(2, 0.f), diffuse_reflectance,
                                   PanelFrame{rows[0], rows[1], rows[2],
                                              AngleBins(to_vector<float>(polar_edges), to_vector<int>(counts))}});
           },
-          "axes"_a, "polar_edges"_a, "counts"_a,
+          "axes"_a, "polar_edges"_a, "counts"_a, "diffuse_reflectance"_a,
           "An opening group that holds a product; rows x, y, z of its frame in the world, bins of its directions.")
       .def(
           "add_point_source",
@@ -309,6 +309,7 @@ NB_MODULE(_engine, m) {
             const int w = frame.width, h = frame.height;
             result["radiance"] = picture(std::move(frame.radiance), w, h);
             result["edge_pixel_count"] = frame.edge_pixel_count;
+            result["pass_count"] = frame.pass_count;
             if (!components) return result;
             result["sun"] = picture(std::move(frame.sun), w, h);
             result["sky"] = picture(std::move(frame.sky), w, h);
@@ -374,6 +375,18 @@ NB_MODULE(_engine, m) {
             return to_array<float>(std::move(areas), {n});
           },
           nb::rv_policy::move, "Exposed area of each patch [m²].")
+      .def_prop_ro(
+          "plan",
+          [](const Session& s) {
+            const RelightPlan& plan = s.present->plan;
+            nb::dict result;
+            result["channels"] = plan.is_grey ? 1 : 3;
+            result["beams"] = plan.beams.beams;
+            result["facing_openings"] = plan.beams.facing_openings;
+            result["beam_patches"] = plan.beams.patches;
+            return result;
+          },
+          "How much of the last relighting its condition needed.")
       .def_prop_ro("sweeps", [](const Session& s) { return s.present->sweeps; })
       .def_prop_ro("shots", [](const Session& s) { return s.present->shots; })
       .def_prop_ro("unshot_share", [](const Session& s) { return s.present->unshot_share; })

@@ -21,7 +21,8 @@ AngleBins::AngleBins(const std::vector<float>& polar_edges, std::vector<int> cou
                         std::is_sorted(polar_edges.begin(), polar_edges.end()) &&
                         std::all_of(counts_.begin(), counts_.end(), [](int count) { return count > 0; });
   if (!is_whole)
-    throw InputError("angle bins: the edges must rise from 0 to pi / 2, one more than rings, each with one bin or more");
+    throw InputError(
+        "angle bins: the edges must rise from 0 to pi / 2, one more than rings, each with one bin or more");
   first_.push_back(0);
   for (const float edge : polar_edges) squares_.push_back(std::sin(edge) * std::sin(edge));
   squares_.front() = 0;

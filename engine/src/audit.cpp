@@ -89,9 +89,8 @@ EnergyAudit Engine::audit(const Lighting& lighting, int rays_per_opening) const 
       rays_->occluded(RayScene::What::kOpaque, rays, blocked);
       for (std::size_t i = 0; i < rays.size(); ++i)
         if (!blocked[i])
-          audit.in_beams +=
-              glm::dvec3(beam.normal_illuminance) *
-              static_cast<double>(flux_share * cosine * passes * rays_->transmittance(rays[i]));
+          audit.in_beams += glm::dvec3(beam.normal_illuminance) *
+                            static_cast<double>(flux_share * cosine * passes * rays_->transmittance(rays[i]));
     }
     for (const Residual& residual : condition.residuals) {
       if (!panel || residual.opening != opening) continue;
@@ -101,8 +100,8 @@ EnergyAudit Engine::audit(const Lighting& lighting, int rays_per_opening) const 
       for (std::size_t i = 0; i < rays.size(); ++i)
         if (!blocked[i]) sunlit += static_cast<double>(flux_share * rays_->transmittance(rays[i]));
       for (int bin = 0; bin < group.panel->bins.count(); ++bin)
-        audit.in_beams +=
-            sunlit * static_cast<double>(group.panel->bins.projected_solid_angle(bin)) * glm::dvec3(residual.radiance[bin]);
+        audit.in_beams += sunlit * static_cast<double>(group.panel->bins.projected_solid_angle(bin)) *
+                          glm::dvec3(residual.radiance[bin]);
     }
   }
   for (const PointSource& source : scene_.point_sources) audit.in_emitted += glm::dvec3(4 * kPi * source.intensity);

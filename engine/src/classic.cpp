@@ -115,7 +115,8 @@ std::vector<ForwardRays::Arrival> ForwardRays::sky_arrivals(const Condition& con
         if (cosine <= 0) continue;
         const float passes =
             openings_[static_cast<std::size_t>(place.triangle->opening)].transmittance_at(cosine) * cosine;
-        if (passes > 0) arrivals.push_back({place.point, direction, -direction, luminance * (solid_angle * area * passes)});
+        if (passes > 0)
+          arrivals.push_back({place.point, direction, -direction, luminance * (solid_angle * area * passes)});
       }
     }
   }

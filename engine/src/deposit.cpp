@@ -198,8 +198,16 @@ std::vector<int> DirectLight::partly_lit(int slot_index, const std::vector<int>&
 // sampled densely; the others keep two samples that did not tell: then the thin shadows that none of them found are, in
 // the mean, made up for.
 void DirectLight::add_sun(const Beam& sun, const Receivers& receivers, const Patterns& patterns,
-                          std::vector<std::vector<glm::vec3>>& sum) const {
-  const std::vector<std::size_t> candidates = reached(sun.direction_to_source, receivers);
+                          std::vector<std::vector<glm::vec3>>& sum, BeamPlan& plan) const {
+  // From indoors, light comes only through openings whose outer side faces it.
+  std::vector<int> facing;
+  for (const int f : large_openings_)
+    if (glm::dot(mesh_.faces().faces[f].normal, sun.direction_to_source) > 0) facing.push_back(f);
+  const std::vector<std::size_t> candidates = reached(sun.direction_to_source, receivers, facing);
+  plan.facing_openings += static_cast<int>(facing.size());
+  plan.patches += static_cast<int>(candidates.size());
+  if (candidates.empty()) return;
+  ++plan.beams;
   const std::vector<float> share = sample_sun(sun, receivers, candidates, patterns);
   std::vector<int> place_of_slot(static_cast<std::size_t>(mesh_.slot_count()), -1);
   for (std::size_t k = 0; k < candidates.size(); ++k)
@@ -240,13 +248,14 @@ void DirectLight::sources_on_slot(int slot_index, const Corners& corners, glm::v
 }
 
 // The receivers that a beam may reach.
-std::vector<std::size_t> DirectLight::reached(glm::vec3 direction, const Receivers& receivers) const {
+std::vector<std::size_t> DirectLight::reached(glm::vec3 direction, const Receivers& receivers,
+                                              const std::vector<int>& openings) const {
   std::vector<std::size_t> found;
-  const BeamOutlines outlines(mesh_.faces(), large_openings_, direction);
+  const BeamOutlines outlines(mesh_.faces(), openings, direction);
   int known_face = -1;
   std::vector<int> passages;  // over that face
   for (std::size_t i = 0; i < receivers.slots.size(); ++i) {
-    if (glm::dot(direction, receivers.normals[i]) <= 0) continue;
+    if (mesh_.is_cluster(receivers.slots[i]) || glm::dot(direction, receivers.normals[i]) <= 0) continue;
     if (receivers.is_behind_openings[i]) {
       const int f = mesh_.slot(receivers.slots[i]).face;
       const Face& face = mesh_.faces().faces[f];
@@ -257,6 +266,22 @@ std::vector<std::size_t> DirectLight::reached(glm::vec3 direction, const Receive
     found.push_back(i);
   }
   return found;
+}
+
+// Faces of a cluster look many ways: each sample asks for the light at its own place.
+void DirectLight::sources_and_beams_on_cluster(const std::vector<Beam>& beams, int slot, std::uint32_t seed,
+                                               std::vector<glm::vec3>& sum) const {
+  const int per_slot = mesh_.elements_per_slot();
+  sum.resize(static_cast<std::size_t>(per_slot), glm::vec3(0));
+  for (int e = 0; e < per_slot; ++e) {
+    const int element = slot * per_slot + e;
+    if (!(mesh_.element_area(element) > 0)) continue;
+    const SobolSequence sequence(hash_seed(seed, static_cast<std::uint64_t>(element)));
+    for (std::uint32_t i = 0; i < kSamplesPerElement; ++i) {
+      const Node place = mesh_.place_on_element(element, sequence.point2(i));
+      sum[e] += illuminance(beams, place.position, place.normal) / static_cast<float>(kSamplesPerElement);
+    }
+  }
 }
 
 // Takes the light away that comes to the points through a small opening first.
@@ -304,9 +329,8 @@ std::map<int, glm::vec3> DirectLight::send_through_small_openings(const std::vec
       for (std::size_t i = 0; i < hits.size(); ++i) {
         const Hit& hit = hits[i];
         if (share[i] <= 0 || hit.face < 0 || mesh_.faces().is_inside_solid(hit.face, hit.side)) continue;
-        const int element = mesh_.element_at(hit), per_slot = mesh_.elements_per_slot();
-        const Slot slot = mesh_.slot(element / per_slot);
-        const float area = mesh_.element_area(slot.face, slot.cell, element % per_slot);
+        const int element = mesh_.element_at(hit);
+        const float area = mesh_.element_area(element);
         if (area > 0) sent[element] += beam.normal_illuminance * (share[i] * flux_share / area);
       }
     }
@@ -314,7 +338,8 @@ std::map<int, glm::vec3> DirectLight::send_through_small_openings(const std::vec
 }
 
 std::vector<LitElement> DirectLight::deposit(const std::vector<Beam>& beams, const Receivers& receivers,
-                                             std::uint32_t seed) const {
+                                             std::uint32_t seed, BeamPlan* plan) const {
+  BeamPlan unasked;
   std::vector<LitElement> lit;
   if (beams.empty() && sources_.empty()) return lit;
   const Patterns patterns(seed);
@@ -323,15 +348,18 @@ std::vector<LitElement> DirectLight::deposit(const std::vector<Beam>& beams, con
   for (const Beam& beam : beams) {
     if (beam.normal_illuminance == glm::vec3(0)) continue;
     if (beam.opening < 0)
-      add_sun(beam, receivers, patterns, sum);
+      add_sun(beam, receivers, patterns, sum, plan ? *plan : unasked);
     else
-      add_lobe(beam, receivers, seed, sum);
+      add_lobe(beam, receivers, seed, sum, plan ? *plan : unasked);
   }
+  parallel_indices(receivers.slots.size(), kGrain, [&](std::size_t i) {
+    if (mesh_.is_cluster(receivers.slots[i])) sources_and_beams_on_cluster(beams, receivers.slots[i], seed, sum[i]);
+  });
   const std::map<int, glm::vec3> sent = send_through_small_openings(beams, seed);
   if (!sources_.empty() || !sent.empty())
     parallel_indices(receivers.slots.size(), kGrain, [&](std::size_t i) {
       sum[i].resize(static_cast<std::size_t>(per_slot), glm::vec3(0));
-      if (!sources_.empty())
+      if (!sources_.empty() && !mesh_.is_cluster(receivers.slots[i]))
         sources_on_slot(receivers.slots[i], receivers.corners[i], receivers.normals[i], patterns, sum[i]);
       const int first = receivers.slots[i] * per_slot;
       for (auto entry = sent.lower_bound(first); entry != sent.end() && entry->first < first + per_slot; ++entry)

@@ -1,6 +1,7 @@
 // Lobes of panels on points and elements: the part of an element inside a shaft is exact, what stands in the way is
 // found by rays.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "transom/deposit.h"
@@ -36,7 +37,42 @@ glm::vec3 point_of(const std::vector<glm::vec3>& corner, glm::vec2 u) {
   return corner[0] + b.x * (corner[k - 1] - corner[0]) + b.y * (corner[k] - corner[0]);
 }
 
+struct Box {
+  glm::vec3 low, high;
+};
+
+Box box_of(const std::array<glm::vec3, 4>& corner) {
+  return {glm::min(glm::min(corner[0], corner[1]), glm::min(corner[2], corner[3])),
+          glm::max(glm::max(corner[0], corner[1]), glm::max(corner[2], corner[3]))};
+}
+
 }  // namespace
+
+// Lifted corners of the elements of a slot.
+std::vector<std::vector<glm::vec3>> DirectLight::element_outlines(int slot_index, const Corners& corners) const {
+  std::vector<std::vector<glm::vec3>> outlines(static_cast<std::size_t>(mesh_.elements_per_slot()));
+  const Slot slot = mesh_.slot(slot_index);
+  if (!mesh_.grid(slot.face).is_quad) {
+    const Face& face = mesh_.faces().faces[static_cast<std::size_t>(slot.face)];
+    const glm::vec3 lift = mesh_.faces().ray_offset() * (slot.side == 0 ? face.normal : -face.normal);
+    for (std::size_t e = 0; e < outlines.size(); ++e) {
+      const ElementShape shape = element_shape(mesh_, slot_index * mesh_.elements_per_slot() + static_cast<int>(e));
+      for (int k = 0; k < shape.corner_count; ++k) outlines[e].push_back(shape.corner[k] + lift);
+    }
+    return outlines;
+  }
+  const auto edge = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<float>(outlines.size()))));
+  const auto place = [&](std::size_t i, std::size_t j) {
+    const float u = static_cast<float>(i) / static_cast<float>(edge),
+                v = static_cast<float>(j) / static_cast<float>(edge);
+    return (1 - v) * ((1 - u) * corners[0] + u * corners[1]) + v * ((1 - u) * corners[3] + u * corners[2]);
+  };
+  for (std::size_t e = 0; e < outlines.size(); ++e) {
+    const std::size_t i = e % edge, j = e / edge;
+    outlines[e] = {place(i, j), place(i + 1, j), place(i + 1, j + 1), place(i, j + 1)};
+  }
+  return outlines;
+}
 
 void DirectLight::shaft_transmission(const Beam& lobe, std::span<const glm::vec3> points,
                                      std::span<float> share) const {
@@ -73,10 +109,8 @@ void DirectLight::shaft_transmission(const Beam& lobe, std::span<const glm::vec3
 std::vector<std::size_t> DirectLight::reached_by_lobe(const Beam& lobe, const Receivers& receivers) const {
   std::vector<std::size_t> found;
   for (std::size_t i = 0; i < receivers.slots.size() && !lobe.shafts->empty(); ++i) {
-    if (glm::dot(lobe.direction_to_source, receivers.normals[i]) <= 0) continue;
-    const Corners& corner = receivers.corners[i];
-    const glm::vec3 low = glm::min(glm::min(corner[0], corner[1]), glm::min(corner[2], corner[3]));
-    const glm::vec3 high = glm::max(glm::max(corner[0], corner[1]), glm::max(corner[2], corner[3]));
+    if (mesh_.is_cluster(receivers.slots[i]) || glm::dot(lobe.direction_to_source, receivers.normals[i]) <= 0) continue;
+    const auto [low, high] = box_of(receivers.corners[i]);
     if (std::any_of(lobe.shafts->begin(), lobe.shafts->end(),
                     [&](const LightShaft& shaft) { return shaft.may_meet(low, high); }))
       found.push_back(i);
@@ -86,13 +120,15 @@ std::vector<std::size_t> DirectLight::reached_by_lobe(const Beam& lobe, const Re
 
 // Adds a lobe to the light of elements, by receiver.
 void DirectLight::add_lobe(const Beam& lobe, const Receivers& receivers, std::uint32_t seed,
-                           std::vector<std::vector<glm::vec3>>& sum) const {
+                           std::vector<std::vector<glm::vec3>>& sum, BeamPlan& plan) const {
   const std::vector<std::size_t> candidates = reached_by_lobe(lobe, receivers);
+  plan.patches += static_cast<int>(candidates.size());
+  plan.beams += !candidates.empty();
   const auto per_slot = static_cast<std::size_t>(mesh_.elements_per_slot());
   parallel_indices(candidates.size(), kGrain, [&](std::size_t k) {
     const std::size_t i = candidates[k];
     std::vector<float> mean;
-    lobe_on_slot(lobe, receivers.slots[i], seed, mean);
+    lobe_on_slot(lobe, receivers.slots[i], receivers.corners[i], seed, mean);
     const glm::vec3 full = lobe.normal_illuminance * glm::dot(lobe.direction_to_source, receivers.normals[i]);
     sum[i].resize(per_slot, glm::vec3(0));
     for (std::size_t e = 0; e < per_slot; ++e) sum[i][e] += mean[e] * full;
@@ -100,23 +136,28 @@ void DirectLight::add_lobe(const Beam& lobe, const Receivers& receivers, std::ui
 }
 
 // Mean share of a lobe on each element of a slot.
-void DirectLight::lobe_on_slot(const Beam& lobe, int slot_index, std::uint32_t seed, std::vector<float>& mean) const {
+void DirectLight::lobe_on_slot(const Beam& lobe, int slot_index, const Corners& corners, std::uint32_t seed,
+                               std::vector<float>& mean) const {
   mean.assign(static_cast<std::size_t>(mesh_.elements_per_slot()), 0.f);
-  const Slot slot = mesh_.slot(slot_index);
-  const Face& face = mesh_.faces().faces[static_cast<std::size_t>(slot.face)];
-  const glm::vec3 lift = mesh_.faces().ray_offset() * (slot.side == 0 ? face.normal : -face.normal);
+  const std::vector<std::vector<glm::vec3>> outlines = element_outlines(slot_index, corners);
+  const auto [low, high] = box_of(corners);
   std::vector<LitPart> parts;
   std::vector<Ray> rays;
   std::vector<std::uint8_t> blocked;
   for (const LightShaft& shaft : *lobe.shafts) {
+    if (!shaft.may_meet(low, high)) continue;
     parts.clear();
-    for (int e = 0; e < mesh_.elements_per_slot(); ++e) {
-      ElementShape shape = element_shape(mesh_, slot_index * mesh_.elements_per_slot() + e);
-      for (glm::vec3& c : shape.corner) c += lift;
-      const std::span<const glm::vec3> outline(shape.corner, static_cast<std::size_t>(shape.corner_count));
-      std::vector<glm::vec3> inside = clip_to_shaft(outline, shaft);
-      const double share = inside.empty() ? 0 : polygon_area(inside) / std::max(polygon_area(outline), 1e-30);
-      if (share > 0) parts.push_back({e, std::move(inside), static_cast<float>(std::min(share, 1.0))});
+    const bool is_whole =
+        std::all_of(corners.begin(), corners.end(), [&](glm::vec3 corner) { return shaft.holds(corner); });
+    for (std::size_t e = 0; e < outlines.size(); ++e) {
+      if (is_whole) {
+        parts.push_back({static_cast<int>(e), outlines[e], 1.f});
+        continue;
+      }
+      std::vector<glm::vec3> inside = clip_to_shaft(outlines[e], shaft);
+      const double share = inside.empty() ? 0 : polygon_area(inside) / std::max(polygon_area(outlines[e]), 1e-30);
+      if (share > 0)
+        parts.push_back({static_cast<int>(e), std::move(inside), static_cast<float>(std::min(share, 1.0))});
     }
     if (parts.empty()) continue;
     const float cosine = -glm::dot(glm::vec3(shaft.plane), lobe.direction_to_source);

@@ -49,7 +49,7 @@ void Engine::solve(const Engine* solved) {
                  ? solved->edges_
                  : choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
     facts_.maximum_edge_m = *std::min_element(edges_.begin(), edges_.end());
-    mesh_ = std::make_unique<LightMesh>(faces_, edges_, options_.elements_per_edge);
+    mesh_ = std::make_unique<LightMesh>(faces_, edges_, options_.elements_per_edge, clusters());
     panels_ = std::make_unique<Panels>(faces_, scene_.materials, scene_.openings);
     gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_, *panels_);
     const float element_edge = facts_.maximum_edge_m / static_cast<float>(options_.elements_per_edge);
@@ -90,6 +90,13 @@ void Engine::solve(const Engine* solved) {
   facts_.patch_count = static_cast<int>(slot_of_patch_.size());
 }
 
+// Small faces taken together, where each for itself would be too many.
+FaceClusters Engine::clusters() const {
+  const std::vector<char> is_small = find_small_faces(faces_, scene_.materials, edges_, options_.target_patch_count);
+  return {faces_, is_small, facts_.maximum_edge_m, options_.target_patch_count / 2,
+          options_.elements_per_edge * options_.elements_per_edge};
+}
+
 Engine::Known Engine::known_from(const Engine* solved) const {
   Known known;
   known.engine = solved;
@@ -115,23 +122,13 @@ glm::vec3 Engine::reflectance(int face, Side side) const {
   return side == 1 ? glm::vec3(scene_.openings[material.opening].diffuse_reflectance) : glm::vec3(0);
 }
 
-std::vector<Share> Engine::to_slots(std::vector<Share> elements) const {
-  for (Share& share : elements) share.index /= mesh_->elements_per_slot();
-  merge_shares(elements);
-  return elements;
-}
-
-std::vector<Share> Engine::patches_at(const std::vector<Share>& slots) const {
+std::vector<Share> Engine::to_patches(const std::vector<Share>& slots) const {
   std::vector<Share> patches;
   patches.reserve(slots.size());
   for (const Share& share : slots)
     if (patch_of_slot_[share.index] >= 0) patches.push_back({patch_of_slot_[share.index], share.weight});
   merge_shares(patches);
   return patches;
-}
-
-std::vector<Share> Engine::to_patches(const std::vector<Share>& elements) const {
-  return patches_at(to_slots(elements));
 }
 
 void Engine::assemble_transfer(const Known& known) {
@@ -144,14 +141,15 @@ void Engine::assemble_transfer(const Known& known) {
   for (std::size_t p = 0; p < n; ++p) {
     const PatchRow& row = patch_rows_[p];
     const Slot slot = mesh_->slot(slot_of_patch_[p]);
-    patch_area_[p] = std::max(1e-6f, row.around->exposure) * mesh_->cell_area(slot.face, slot.cell);
+    patch_area_[p] = std::max(1e-6f, row.around->exposure) * mesh_->slot_area(slot_of_patch_[p]);
     for (int e = 0; e < mesh_->elements_per_slot(); ++e)
-      element_share_.push_back(mesh_->element_area(slot.face, slot.cell, e) / patch_area_[p]);
+      element_share_.push_back(mesh_->element_area(slot_of_patch_[p] * mesh_->elements_per_slot() + e) /
+                               patch_area_[p]);
     patch_reflectance_[p] = reflectance(slot.face, slot.side);
     patch_emitted_[p] = kPi * scene_.materials[faces_.faces[slot.face].material].luminance;
     row_sums[p] = is_interior_[p] ? 1.f : 1.f - row.around->escaped;
     is_behind_openings[p] = is_interior_[p] && row.around->escaped == 0;
-    through_.append(patches_at(row.beyond->through));
+    through_.append(to_patches(row.beyond->through));
     facts_.kept_patch_rows += known.has_surroundings && known.engine->patch_of_slot_[slot_of_patch_[p]] >= 0;
     patch_sky_.append(row.beyond->sky);
   }
@@ -161,22 +159,24 @@ void Engine::assemble_transfer(const Known& known) {
     if (is_interior_[p]) interior += patch_area_[p];
     if (is_interior_[p] && patch_emitted_[p] != glm::vec3(0)) emitting += patch_area_[p];
   }
+  const auto is_grey = [](glm::vec3 colour) { return colour.x == colour.y && colour.y == colour.z; };
+  is_grey_scene_ = std::all_of(patch_reflectance_.begin(), patch_reflectance_.end(), is_grey) &&
+                   std::all_of(patch_emitted_.begin(), patch_emitted_.end(), is_grey) &&
+                   std::all_of(scene_.point_sources.begin(), scene_.point_sources.end(),
+                               [&](const PointSource& source) { return is_grey(source.intensity); });
   connects_emitters_ = emitting < kConnectedShare * interior;
   if (known.has_same_patches && is_interior_ == known.engine->is_interior_) {
     form_factors_ = known.engine->form_factors_;
     facts_.defects = known.engine->facts_.defects;
   } else {
     SparseRows sampled;
-    for (const PatchRow& row : patch_rows_) sampled.append(patches_at(row.around->reached));
+    for (const PatchRow& row : patch_rows_) sampled.append(to_patches(row.around->reached));
     facts_.defects = make_reciprocal(sampled, patch_area_, row_sums);
     form_factors_ = std::make_shared<const SparseRows>(std::move(sampled));
   }
   std::vector<PatchPlace> places(n);
   for (std::size_t p = 0; p < n; ++p) {
-    const Slot slot = mesh_->slot(slot_of_patch_[p]);
-    const Face& face = faces_.faces[slot.face];
-    places[p] = {face.position(mesh_->cell_parameters(slot.face, slot.cell, glm::vec2(1.f / 3))),
-                 slot.side == 0 ? face.normal : -face.normal};
+    places[p] = {mesh_->middle_of(slot_of_patch_[p]).position, mesh_->normal_of(slot_of_patch_[p])};
   }
   interreflection_ =
       std::make_unique<Interreflection>(*form_factors_, through_, patch_reflectance_, patch_area_, places);
@@ -188,8 +188,7 @@ void Engine::assemble_transfer(const Known& known) {
 std::vector<int> Engine::cell_divisions() const {
   std::vector<int> divisions;
   for (std::size_t p = 0; p < patch_rows_.size(); ++p) {
-    const Slot slot = mesh_->slot(slot_of_patch_[p]);
-    const float size = std::sqrt(mesh_->cell_area(slot.face, slot.cell));
+    const float size = std::sqrt(mesh_->slot_area(slot_of_patch_[p]));
     const float distance = std::max(patch_rows_[p].around->harmonic_distance, 1e-6f * faces_.extent);
     const float wanted = size / (options_.node_spacing * distance);
     const bool is_small = size < kLeastDividedSize * facts_.maximum_edge_m;
@@ -203,7 +202,8 @@ void Engine::gather_nodes(Known& known) {
   const std::vector<int> divisions = cell_divisions();
   std::vector<std::pair<int, int>> cells;  // slot, divisions
   for (std::size_t p = 0; p < slot_of_patch_.size(); ++p)
-    if (patch_reflectance_[p] != glm::vec3(0)) cells.push_back({slot_of_patch_[p], divisions[p]});
+    if (patch_reflectance_[p] != glm::vec3(0) && !mesh_->is_cluster(slot_of_patch_[p]))  // a cluster shows its patch
+      cells.push_back({slot_of_patch_[p], divisions[p]});
   std::sort(cells.begin(), cells.end());
   std::vector<int> slots, slot_divisions;
   for (const auto& [slot, division] : cells) {
@@ -256,7 +256,7 @@ std::shared_ptr<const Engine::NodeRows> Engine::node_rows(const Known& known) co
       const NodeRows& known_rows = *known.engine->node_rows_;
       rows[i].reached = known_rows.patches.row(other);
       for (Share& share : rows[i].reached) share.index = known.engine->slot_of_patch_[share.index];
-      rows[i].reached = patches_at(rows[i].reached);
+      rows[i].reached = to_patches(rows[i].reached);
       rows[i].sky = known_rows.sky.row(other);
       rows[i].exposure = known_rows.exposure[other];
     } else {

@@ -12,7 +12,7 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr int kMaximumCycles = 20000;
-constexpr int kShownCycle = 2;  // of interreflection: about 3 % of the flux is still to come
+constexpr int kShownCycle = 1;  // of interreflection: less than 1 % of the flux is still to come
 
 }  // namespace
 
@@ -43,15 +43,26 @@ std::vector<BrightElement> Engine::bright_elements(std::span<const LitElement> l
   return bright;
 }
 
+bool Engine::is_grey(const Condition& condition) const {
+  const auto is_grey = [](glm::vec3 colour) { return colour.x == colour.y && colour.y == colour.z; };
+  return is_grey_scene_ && is_grey(condition.sky_colour) && is_grey(condition.ground_luminance) &&
+         std::all_of(condition.beams.begin(), condition.beams.end(),
+                     [&](const Beam& beam) { return is_grey(beam.normal_illuminance); }) &&
+         std::all_of(condition.residuals.begin(), condition.residuals.end(), [&](const Residual& rest) {
+           return std::all_of(rest.radiance.begin(), rest.radiance.end(), is_grey);
+         });
+}
+
 // Light that has not been reflected: of beams and point sources on elements, of the sky on patches and at nodes.
 Lighting Engine::direct_light_of(Condition condition) const {
   Lighting lighting;
   lighting.condition = std::move(condition);
   find_shafts(lighting.condition, lighting.panel_residual);
+  lighting.plan.is_grey = is_grey(lighting.condition);
   {
     const TracePhase phase(trace_, "beams");
-    lighting.lit_elements =
-        beam_light_->deposit(lighting.condition.beams, receivers_, hash_seed(options_.seed, kBeamStream));
+    lighting.lit_elements = beam_light_->deposit(lighting.condition.beams, receivers_,
+                                                 hash_seed(options_.seed, kBeamStream), &lighting.plan.beams);
     lighting.beam_lit_count = lighting.lit_elements.size();
     lighting.lit_elements.insert(lighting.lit_elements.end(), lit_by_sources_.begin(), lit_by_sources_.end());
     lighting.bright_elements = bright_elements({lighting.lit_elements.data(), lighting.beam_lit_count});
@@ -65,6 +76,13 @@ Lighting Engine::direct_light_of(Condition condition) const {
     }
   }
   find_panel_radiance({}, lighting);
+  find_sky_light(lighting);
+  if (panel_patches_.entries.empty()) return lighting;
+  // Surfaces outdoors send on most of what they will in the end once they have their direct light.
+  std::vector<glm::vec3> radiosity(lighting.patch_sky.size());
+  for (std::size_t p = 0; p < radiosity.size(); ++p)
+    radiosity[p] = patch_emitted_[p] + patch_reflectance_[p] * (lighting.patch_sky[p] + lighting.patch_sun[p]);
+  find_panel_radiance(radiosity, lighting);
   find_sky_light(lighting);
   return lighting;
 }
@@ -128,7 +146,8 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
   std::vector<glm::vec3> first_reflection = node_always_;
   {
     const TracePhase phase(trace_, "first reflection");
-    links_->add_irradiance({lighting->bright_elements.data(), lighting->beam_bright_count}, first_reflection);
+    links_->add_irradiance({lighting->bright_elements.data(), lighting->beam_bright_count}, lighting->plan.is_grey,
+                           first_reflection);
   }
   if (!is_wanted()) return nullptr;
   // A state on the way once most of the indirect light is there; later cycles change what an eye does not see.
@@ -143,7 +162,7 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
     }
     return true;
   };
-  if (!solve_with_panels(*lighting, after_cycle)) return nullptr;
+  if (!solve_with_panels(*lighting, after_cycle) || !is_wanted()) return nullptr;
   gather_indirect(*lighting, first_reflection);
   return lighting;
 }

@@ -17,6 +17,7 @@ namespace transom {
 namespace {
 
 constexpr int kMaximumCycles = 20000;
+constexpr double kSameRadiance = 1e-3;   // change of the flux of panels at which rounds end, relative
 constexpr double kMostScale = 2;         // of sampled weights: beyond it too few rays have met a bin
 constexpr int kMaximumRounds = 16;       // of light between outdoors and the room through panels
 constexpr float kGrazingCosine = 1e-4f;  // of a lobe to its panel, from which on it carries nothing
@@ -167,10 +168,14 @@ double Engine::find_panel_radiance(const std::vector<glm::vec3>& radiosity, Ligh
     const auto first = static_cast<std::size_t>(panel.first_bin), count = static_cast<std::size_t>(bins.count());
     const std::vector<float>& transmission = products_[static_cast<std::size_t>(panel.opening)].transmission;
     const float area = faces_.faces[static_cast<std::size_t>(panel.face)].area;
+    if (!transmission.empty())
+      parallel_indices(count, 16, [&](std::size_t out) {
+        glm::vec3 passed(0);
+        for (std::size_t in = 0; in < count; ++in) passed += transmission[out * count + in] * arriving[first + in];
+        lighting.panel_radiance[first + out] += passed;
+      });
     for (std::size_t out = 0; out < count; ++out) {
-      glm::vec3& radiance = lighting.panel_radiance[first + out];
-      for (std::size_t in = 0; in < count && !transmission.empty(); ++in)
-        radiance += transmission[out * count + in] * arriving[first + in];
+      const glm::vec3 radiance = lighting.panel_radiance[first + out];
       const glm::vec3 added = before.empty() ? radiance : glm::abs(radiance - before[first + out]);
       const float weight = area * bins.projected_solid_angle(static_cast<int>(out));
       change += static_cast<double>(weight * (added.x + added.y + added.z));
@@ -188,15 +193,15 @@ bool Engine::solve_with_panels(Lighting& lighting, const Interreflection::AfterC
   std::vector<glm::vec3> direct(n), radiosity;
   for (int round = 0; round < kMaximumRounds; ++round) {
     for (std::size_t p = 0; p < n; ++p) direct[p] = lighting.patch_sky[p] + lighting.patch_sun[p];
-    const int cycles = interreflection_->solve(patch_emitted_, direct, options_.tolerance, kMaximumCycles,
-                                               lighting.patch_irradiance, after_cycle);
+    const int cycles = interreflection_->solve({patch_emitted_, direct, lighting.plan.is_grey}, options_.tolerance,
+                                               kMaximumCycles, lighting.patch_irradiance, after_cycle);
     if (cycles == 0) return false;
     lighting.sweeps += cycles;
     if (panel_patches_.entries.empty()) return true;
     radiosity.resize(n);
     for (std::size_t p = 0; p < n; ++p)
       radiosity[p] = patch_emitted_[p] + patch_reflectance_[p] * lighting.patch_irradiance[p];
-    if (find_panel_radiance(radiosity, lighting) <= options_.tolerance) return true;
+    if (find_panel_radiance(radiosity, lighting) <= kSameRadiance) return true;
     find_sky_light(lighting);
   }
   return true;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "transom/box_tree.h"
+
 namespace transom {
 namespace {
 
@@ -11,10 +13,6 @@ struct Corner {
   glm::dvec3 normal;
 };
 using Polygon = std::vector<Corner>;
-
-struct Box {
-  glm::dvec3 low, high;
-};
 
 // A face that may cut others.
 struct Cutter {
@@ -35,10 +33,6 @@ Box box_of(const auto& corners, double margin, const auto& position) {
     box.high = glm::max(box.high, position(c));
   }
   return {box.low - margin, box.high + margin};
-}
-
-bool overlap(const Box& a, const Box& b) {
-  return glm::all(glm::lessThanEqual(a.low, b.high)) && glm::all(glm::lessThanEqual(b.low, a.high));
 }
 
 // Length of the segment p q inside the cutter's convex polygon, widened by the tolerance [Cyrus & Beck 1978].
@@ -121,14 +115,21 @@ std::vector<FacePiece> cut_faces(const SceneGeometry& scene, glm::dvec3 origin, 
     cutters.push_back(std::move(cutter));
   }
 
+  std::vector<Box> boxes;
+  for (const Cutter& cutter : cutters) boxes.push_back(cutter.box);
+  const BoxTree tree(std::move(boxes));
   std::vector<FacePiece> pieces;
   Polygon front, back;
+  std::vector<int> near;
   for (std::size_t f = 0; f < scene.faces.size(); ++f) {
     std::vector<Polygon> parts{polygon_of(f)};
     if (scene.materials[scene.face_material[f]].opening < 0) {
-      const Box box = box_of(parts[0], 0.0, [](const Corner& c) { return c.position; });
-      for (const Cutter& cutter : cutters) {
-        if (!overlap(box, cutter.box)) continue;
+      near.clear();
+      tree.visit(box_of(parts[0], 0.0, [](const Corner& c) { return c.position; }),
+                 [&](int cutter) { near.push_back(cutter); });
+      std::sort(near.begin(), near.end());
+      for (const int index : near) {
+        const Cutter& cutter = cutters[index];
         for (std::size_t k = 0, count = parts.size(); k < count; ++k)
           if (cut(parts[k], cutter, tolerance, front, back)) {
             parts[k] = front;

@@ -38,10 +38,9 @@ std::vector<int> Engine::first_slots() const {
 
 // Where the search for patches starts: first_slots, what panels see outdoors, and what point sources light.
 std::vector<int> Engine::first_wave() const {
-  const int per_slot = mesh_->elements_per_slot();
   std::vector<int> wave = first_slots();
   for (const GatherRow& row : panel_rows_)
-    for (const Share& share : row.through) wave.push_back(share.index / per_slot);
+    for (const Share& share : row.through) wave.push_back(share.index);
   for (std::size_t i = 0; i < scene_.point_sources.size(); ++i) {
     const SobolSequence points(hash_seed(options_.seed, kSourceStream + i));
     std::vector<Ray> rays;
@@ -55,7 +54,7 @@ std::vector<int> Engine::first_wave() const {
     rays_->intersect(RayScene::What::kAll, rays, hits);
     for (const Hit& hit : hits)
       if (hit.face >= 0 && !faces_.is_inside_solid(hit.face, hit.side))
-        wave.push_back(mesh_->element_at(hit) / per_slot);
+        wave.push_back(mesh_->slot_at(hit));
   }
   std::sort(wave.begin(), wave.end());
   wave.erase(std::unique(wave.begin(), wave.end()), wave.end());
@@ -71,15 +70,13 @@ Engine::PatchRow Engine::patch_row(int slot, const Known& known) const {
   if (known_row) {
     row.around = known_row->around;
   } else {
-    GatherRow around = gatherer_->surroundings_of_patch(slot, options_.patch_samples, seed);
-    around.reached = to_slots(around.reached);
-    row.around = std::make_shared<const GatherRow>(std::move(around));
+    row.around =
+        std::make_shared<const GatherRow>(gatherer_->surroundings_of_patch(slot, options_.patch_samples, seed));
   }
   GatherRow beyond;
   beyond.exposure = row.around->exposure;
   beyond.sky = row.around->sky;
   gatherer_->look_through_openings(slot, options_.patch_samples, seed, beyond);
-  beyond.through = to_slots(beyond.through);
   row.beyond = std::make_shared<const GatherRow>(std::move(beyond));
   return row;
 }
@@ -93,8 +90,7 @@ void Engine::find_patches(std::vector<int> wave, const Known& known) {
     }
     const std::size_t base = patch_rows_.size();
     patch_rows_.resize(base + wave.size());
-    parallel_indices(wave.size(), kGrain,
-                     [&](std::size_t i) { patch_rows_[base + i] = patch_row(wave[i], known); });
+    parallel_indices(wave.size(), kGrain, [&](std::size_t i) { patch_rows_[base + i] = patch_row(wave[i], known); });
     std::vector<int> next;
     for (std::size_t i = base; i < patch_rows_.size(); ++i)
       for (const std::vector<Share>* shares : {&patch_rows_[i].around->reached, &patch_rows_[i].beyond->through})
@@ -176,9 +172,7 @@ void Engine::check_closed() {
   facts_.leak_share = total > 0 ? escaped / total : 0;
   if (facts_.leak_share <= kLeakTolerance) return;
   const Slot slot = mesh_->slot(slot_of_patch_[worst_patch]);
-  const glm::dvec3 place =
-      faces_.origin + glm::dvec3(mesh_->lifted_position(
-                          slot.face, slot.side, mesh_->cell_parameters(slot.face, slot.cell, glm::vec2(1.f / 3))));
+  const glm::dvec3 place = faces_.origin + glm::dvec3(mesh_->middle_of(slot_of_patch_[worst_patch]).position);
   std::ostringstream text;
   text.precision(3);
   if (scene_.materials[faces_.faces[slot.face].material].opening >= 0)

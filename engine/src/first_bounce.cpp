@@ -25,6 +25,7 @@ glm::vec3 point_of(const ElementShape& shape, int i) {
   const float u = std::fmod(0.5f + 0.7548776662f * static_cast<float>(i), 1.f),
               v = std::fmod(0.5f + 0.5698402910f * static_cast<float>(i), 1.f);
   const glm::vec3* c = shape.corner;
+  if (shape.corner_count == 0) return shape.middle;
   if (shape.corner_count == 4) {
     const glm::vec3 lift = shape.middle - 0.25f * (c[0] + c[1] + c[2] + c[3]);
     return (1 - u) * (1 - v) * c[0] + u * (1 - v) * c[1] + u * v * c[2] + (1 - u) * v * c[3] + lift;
@@ -37,10 +38,15 @@ glm::vec3 point_of(const ElementShape& shape, int i) {
 }  // namespace
 
 ElementShape element_shape(const LightMesh& mesh, int element_index) {
+  const Node middle = mesh.middle_of_element(element_index);
+  ElementShape shape;
+  shape.middle = middle.position;
+  shape.normal = middle.normal;
+  shape.area = mesh.element_area(element_index);
+  if (mesh.is_cluster(element_index / mesh.elements_per_slot())) return shape;
   const Slot slot = mesh.slot(element_index / mesh.elements_per_slot());
   const int element = element_index % mesh.elements_per_slot();
   const bool is_quad = mesh.grid(slot.face).is_quad;
-  ElementShape shape;
   shape.corner_count = is_quad ? 4 : 3;
   const glm::vec2 quad_corner[4]{{0, 0}, {1, 0}, {1, 1}, {0, 1}}, triangle_corner[3]{{0, 0}, {1, 0}, {0, 1}};
   for (int k = 0; k < shape.corner_count; ++k) {
@@ -51,19 +57,20 @@ ElementShape element_shape(const LightMesh& mesh, int element_index) {
     shape.corner[place] =
         mesh.faces().faces[slot.face].position(mesh.element_parameters(slot.face, slot.cell, element, local));
   }
-  shape.middle = mesh.lifted_position(
-      slot.face, slot.side,
-      mesh.element_parameters(slot.face, slot.cell, element, is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3)));
-  shape.area = mesh.element_area(slot.face, slot.cell, element);
   return shape;
 }
 
-float element_share(glm::vec3 point, glm::vec3 normal, const ElementShape& shape, glm::vec3 element_normal) {
+float element_share(glm::vec3 point, glm::vec3 normal, const ElementShape& shape) {
   const glm::vec3 to_element = shape.middle - point;
   const float distance2 = glm::dot(to_element, to_element);
+  if (shape.corner_count == 0) {  // as a disc of that area, seen along its axis
+    const float facing = glm::dot(to_element, normal), away = -glm::dot(to_element, shape.normal);
+    if (facing <= 0 || away <= 0) return 0;
+    return shape.area * facing * away / (distance2 * (kPi * distance2 + shape.area));
+  }
   if (distance2 <= kAdjacent * kAdjacent * 2 * shape.area)
     return point_to_polygon(point, normal, {shape.corner, static_cast<std::size_t>(shape.corner_count)});
-  const float cosine = glm::dot(to_element, normal), height = -glm::dot(to_element, element_normal);
+  const float cosine = glm::dot(to_element, normal), height = -glm::dot(to_element, shape.normal);
   if (cosine <= 0 || height <= 0) return 0;
   return shape.area * cosine * height / (kPi * distance2 * distance2);
 }
@@ -77,12 +84,9 @@ void FirstBounce::add(const BrightElement& bright) {
   const int slot_index = bright.element / mesh_.elements_per_slot();
   const float strength = bright.radiosity.x + bright.radiosity.y + bright.radiosity.z;
   if (!(strength > 0)) return;
-  const Slot slot = mesh_.slot(slot_index);
-  const Face& face = mesh_.faces().faces[slot.face];
   if (patches_.empty() || patches_.back().slot != slot_index)
-    patches_.push_back({slot_index, pieces_.size(), pieces_.size(), glm::vec3(0),
-                        slot.side == 0 ? face.normal : -face.normal, glm::vec3(0), 0,
-                        std::sqrt(2 * mesh_.cell_area(slot.face, slot.cell))});
+    patches_.push_back({slot_index, pieces_.size(), pieces_.size(), glm::vec3(0), mesh_.normal_of(slot_index),
+                        glm::vec3(0), 0, std::sqrt(2 * mesh_.slot_area(slot_index)), mesh_.is_cluster(slot_index)});
   LitPatch& patch = patches_.back();
   pieces_.push_back({element_shape(mesh_, bright.element), bright.radiosity});
   const ElementShape& shape = pieces_.back().shape;
@@ -105,16 +109,16 @@ glm::vec3 FirstBounce::irradiance(glm::vec3 point, glm::vec3 normal, Rays precis
   for (const LitPatch& patch : patches_) {
     const glm::vec3 to_patch = patch.centroid - point;
     const float height = -glm::dot(to_patch, patch.normal);
-    if (height <= 0) continue;  // all of a planar patch is seen from behind
+    if (height <= 0 && !patch.is_cluster) continue;  // all of a planar patch is seen from behind
     const float distance2 = glm::dot(to_patch, to_patch);
-    if (precision == Rays::kOne && distance2 > kFar * kFar * patch.size * patch.size) {
+    if (precision == Rays::kOne && !patch.is_cluster && distance2 > kFar * kFar * patch.size * patch.size) {
       const float cosine = glm::dot(to_patch, normal);
       if (cosine > 0) connect(patch.centroid, patch.flux * (cosine * height / (kPi * distance2 * distance2)));
       continue;
     }
     for (std::size_t k = patch.first_element; k < patch.last_element; ++k) {
       const LitPiece& piece = pieces_[k];
-      const float share = element_share(point, normal, piece.shape, patch.normal);
+      const float share = element_share(point, normal, piece.shape);
       if (share <= 0) continue;
       const int count =
           precision == Rays::kOne ? 1 : std::clamp(static_cast<int>(std::ceil(kRaysPerShare * share)), 1, kMostRays);

@@ -2,45 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
-#include <tuple>
 
+#include "frame_masks.h"
 #include "transom/parallel.h"
-#include "transom/shadow_volumes.h"
 
 namespace transom {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr std::size_t kBlock = 256;  // pixels or points at once
-constexpr int kLargestMask = 4096;   // pixels a side of a stencil mask
 constexpr float kSameShare = 0.02f;  // of a beam, between neighbouring pixels without an edge
 
 }  // namespace
-
-/// Share of each beam at each pixel of the stencil masks, which are as fine as the samples of edges, or as OpenGL's
-/// largest picture allows.
-class FrameRenderer::Masks {
- public:
-  Masks(const View& view, int edge_samples)
-      : width_(view.width),
-        samples_(edge_samples),
-        scale_(std::clamp(kLargestMask / std::max(view.width, view.height), 1, edge_samples)) {}
-
-  int scale() const { return scale_; }
-  /// Of a sample of a pixel; -1: its centre.
-  std::size_t index(int pixel, int sample) const {
-    const int i = sample < 0 ? samples_ / 2 : sample % samples_, j = sample < 0 ? samples_ / 2 : sample / samples_;
-    const int column = pixel % width_ * scale_ + (2 * i + 1) * scale_ / (2 * samples_),
-              row = pixel / width_ * scale_ + (2 * j + 1) * scale_ / (2 * samples_);
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(width_ * scale_) + static_cast<std::size_t>(column);
-  }
-  std::vector<std::vector<float>> share;  // by beam, by pixel of the mask
-
- private:
-  int width_, samples_, scale_;
-};
 
 FrameRenderer::FrameRenderer(const Engine& engine) : engine_(engine) {}
 FrameRenderer::~FrameRenderer() = default;
@@ -98,14 +72,42 @@ void FrameRenderer::find_shares(const Beam& beam, std::span<const BeamPoint> poi
   for (std::size_t k = 0; k < facing.size(); ++k) shares[facing[k]] = found[k];
 }
 
+std::vector<FrameRenderer::Box> FrameRenderer::boxes_of(const std::vector<BeamPoint>& points) const {
+  std::vector<Box> boxes((points.size() + kBlock - 1) / kBlock);
+  parallel_indices(boxes.size(), 16, [&](std::size_t b) {
+    Box box{glm::vec3(Ray::kInfinity), glm::vec3(-Ray::kInfinity)};
+    for (std::size_t k = b * kBlock; k < std::min(points.size(), (b + 1) * kBlock); ++k) {
+      if (points[k].surface < 0) continue;
+      box.low = glm::min(box.low, points[k].position);
+      box.high = glm::max(box.high, points[k].position);
+    }
+    boxes[b] = box;
+  });
+  return boxes;
+}
+
+// Shares of all points; blocks that no shaft of a lobe can meet are passed over.
+void FrameRenderer::find_shares_by_block(const Beam& beam, const std::vector<BeamPoint>& points,
+                                         const std::vector<Box>& boxes, const std::vector<float>* mask_share,
+                                         const Masks& masks, std::vector<float>& shares) const {
+  shares.resize(points.size());
+  parallel_indices(boxes.size(), 1, [&](std::size_t b) {
+    const std::size_t begin = b * kBlock, size = std::min(kBlock, points.size() - begin);
+    const bool may_be_lit =
+        beam.opening < 0 || std::any_of(beam.shafts->begin(), beam.shafts->end(),
+                                        [&](const auto& s) { return s.may_meet(boxes[b].low, boxes[b].high); });
+    if (may_be_lit)
+      find_shares(beam, {&points[begin], size}, mask_share, masks, {&shares[begin], size});
+    else
+      std::fill(&shares[begin], &shares[begin] + size, 0.f);
+  });
+}
+
 void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const std::vector<float>* mask_share,
                              const Masks& masks, std::vector<glm::vec3>& picture, std::vector<char>& is_edge) const {
   const int width = samples.view.width, height = samples.view.height, s = samples.edge_samples;
-  const std::size_t pixel_count = samples.centre.size();
-  std::vector<float> share(pixel_count);
-  parallel_ranges(pixel_count, kBlock, [&](std::size_t begin, std::size_t end) {
-    find_shares(beam, {&samples.centre[begin], end - begin}, mask_share, masks, {&share[begin], end - begin});
-  });
+  std::vector<float> share;
+  find_shares_by_block(beam, samples.centre, centre_boxes_, mask_share, masks, share);
   const auto reflected = [&](const BeamPoint& point, float of_beam) {
     return of_beam * point.weight * glm::dot(point.normal, beam.direction_to_source) / kPi *
            engine_.reflectance(point.surface / 2, point.surface % 2) * beam.normal_illuminance;
@@ -119,6 +121,10 @@ void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const
     std::vector<BeamPoint> points;
     std::vector<float> shares;
     const int y = static_cast<int>(row);
+    // By rays nothing happens where neither the row nor its neighbours are lit.
+    const auto first = share.begin() + std::max(y - 1, 0) * width,
+               last = share.begin() + std::min(y + 2, height) * width;
+    if (!mask_share && std::all_of(first, last, [](float of_beam) { return of_beam == 0; })) return;
     for (int x = 0; x < width; ++x) {
       const int pixel = y * width + x;
       const BeamPoint& centre = samples.centre[pixel];
@@ -157,10 +163,8 @@ void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const
   // Pixels with an edge of a surface, and panes: every sample for itself. Neither depends on the other's order.
   for (const std::vector<BeamPoint>* points : {&samples.fine, &samples.on_panes}) {
     const std::vector<float>* shares_by_mask = points == &samples.fine ? mask_share : nullptr;
-    share.resize(points->size());
-    parallel_ranges(points->size(), kBlock, [&](std::size_t begin, std::size_t end) {
-      find_shares(beam, {&(*points)[begin], end - begin}, shares_by_mask, masks, {&share[begin], end - begin});
-    });
+    const std::vector<Box>& boxes = points == &samples.fine ? fine_boxes_ : pane_boxes_;
+    find_shares_by_block(beam, *points, boxes, shares_by_mask, masks, share);
     for (std::size_t k = 0; k < points->size(); ++k)
       if (share[k] > 0) picture[(*points)[k].pixel] += reflected((*points)[k], share[k]);
   }
@@ -199,15 +203,14 @@ Frame FrameRenderer::render(const View& view, const Lighting& lighting, FrameOpt
     const TracePhase samples_phase(engine_.trace(), "view");
     samples_.reset();
     samples_ = std::make_unique<ViewSamples>(engine_, view, options.edge_samples);
+    centre_boxes_ = boxes_of(samples_->centre);
+    fine_boxes_ = boxes_of(samples_->fine);
+    pane_boxes_ = boxes_of(samples_->on_panes);
   }
   const ViewSamples& samples = *samples_;
   const Condition& condition = lighting.condition;
-  Masks masks(view, options.edge_samples);
+  const Masks masks(view, options.edge_samples);
   const bool use_volumes = options.visibility == Visibility::kVolumes;
-  if (use_volumes) {
-    const TracePhase volume_phase(engine_.trace(), "volumes");
-    render_masks(view, condition.beams, masks);
-  }
 
   const std::size_t pixel_count = samples.centre.size();
   Frame frame;
@@ -228,8 +231,15 @@ Frame FrameRenderer::render(const View& view, const Lighting& lighting, FrameOpt
   std::vector<char> is_edge = samples.has_edge;
   {
     const TracePhase beam_phase(engine_.trace(), "beams of the picture");
-    for (std::size_t b = 0; b < condition.beams.size(); ++b)
-      add_beam(samples, condition.beams[b], use_volumes ? &masks.share[b] : nullptr, masks, sun, is_edge);
+    std::vector<float> mask_share;
+    for (const Beam& beam : condition.beams) {
+      if (beam.normal_illuminance == glm::vec3(0) || (beam.opening >= 0 && beam.shafts->empty())) continue;
+      if (use_volumes) {
+        const TracePhase volume_phase(engine_.trace(), "volumes");
+        frame.pass_count += render_mask(beam, view, masks, mask_share);
+      }
+      add_beam(samples, beam, use_volumes ? &mask_share : nullptr, masks, sun, is_edge);
+    }
   }
   for (const ViewSamples::Constant& c : samples.constant) {
     sun[c.pixel] += c.lamps;
@@ -245,52 +255,6 @@ Frame FrameRenderer::render(const View& view, const Lighting& lighting, FrameOpt
     });
   frame.edge_pixel_count = static_cast<int>(std::count(is_edge.begin(), is_edge.end(), 1));
   return frame;
-}
-
-// Share of each beam at each sample: lit or not by the stencil, times the transmittance of the openings that it
-// counted.
-void FrameRenderer::render_masks(const View& view, const std::vector<Beam>& beams, Masks& masks) {
-  if (!volumes_) {
-    std::vector<glm::vec3> vertices;
-    std::vector<glm::uvec3> opaque;
-    std::vector<std::vector<glm::uvec3>> openings;
-    std::map<std::tuple<int, int, int, int>, std::size_t> group_of;
-    for (const Face& face : engine_.faces().faces) {
-      const int opening = engine_.scene().materials[face.material].opening;
-      std::vector<glm::uvec3>* list = &opaque;
-      if (opening >= 0) {
-        const glm::ivec3 n(glm::round(1e3f * face.normal));
-        const auto [entry, is_new] = group_of.try_emplace({opening, n.x, n.y, n.z}, openings.size());
-        if (is_new) {
-          openings.emplace_back();
-          volume_groups_.push_back({opening, face.normal});
-        }
-        list = &openings[entry->second];
-      }
-      const unsigned base = static_cast<unsigned>(vertices.size());
-      vertices.insert(vertices.end(), face.corner, face.corner + (face.is_quad ? 4 : 3));
-      list->push_back({base, base + 1, base + 2});
-      if (face.is_quad) list->push_back({base, base + 2, base + 3});
-    }
-    context_ = std::make_unique<GlContext>();
-    volumes_ = std::make_unique<ShadowVolumes>(*context_, vertices, opaque, openings);
-  }
-  const glm::dvec3 origin = engine_.faces().origin;
-  const VolumeCamera camera{view.position - origin, view.target - origin,       view.up,
-                            view.vertical_fov_rad,  view.width * masks.scale(), view.height * masks.scale()};
-  for (const Beam& beam : beams) {
-    const BeamMask mask = volumes_->render(camera, glm::dvec3(beam.direction_to_source));
-    std::vector<float> transmittance;
-    for (const VolumeGroup& group : volume_groups_)
-      transmittance.push_back(
-          engine_.scene().openings[group.opening].transmittance_at(glm::dot(group.normal, beam.direction_to_source)));
-    std::vector<float>& share = masks.share.emplace_back(mask.shadowed.size());
-    parallel_indices(share.size(), 4096, [&](std::size_t i) {
-      share[i] = mask.shadowed[i] ? 0.f : 1.f;
-      for (std::size_t g = 0; g < transmittance.size() && share[i] > 0; ++g)
-        for (int n = 0; n < mask.crossings[g][i]; ++n) share[i] *= transmittance[g];
-    });
-  }
 }
 
 }  // namespace transom

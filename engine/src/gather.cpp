@@ -50,8 +50,8 @@ void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint
   Hit hits[kBlock];
   int buried = 0, escaped = 0;
   double inverse_distance = 0;
-  std::vector<Share>& reached = row.reached;
-  reached.reserve(static_cast<std::size_t>(count));
+  std::vector<int> slots;  // one a ray
+  slots.reserve(static_cast<std::size_t>(count));
   std::vector<int> open_bins;
   auto next = order.begin();
   for (int begin = 0; begin < count; begin += kBlock) {
@@ -71,7 +71,7 @@ void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint
       } else if (mesh_.faces().is_inside_solid(hits[i].face, hits[i].side)) {
         ++buried;
       } else {
-        reached.push_back({mesh_.element_at(hits[i]), 1});
+        slots.push_back(mesh_.slot_at(hits[i]));
         inverse_distance += 1 / std::max(hits[i].t, mesh_.faces().ray_offset());
       }
     }
@@ -80,8 +80,12 @@ void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint
   row.exposure = static_cast<float>(exposed) / static_cast<float>(count);
   if (exposed == 0) return;
   const float share = 1 / static_cast<float>(exposed);
-  merge_shares(reached);
-  for (Share& s : reached) s.weight *= share;
+  std::sort(slots.begin(), slots.end());
+  for (auto first = slots.begin(); first != slots.end();) {
+    const auto last = std::find_if(first, slots.end(), [&](int slot) { return slot != *first; });
+    row.reached.push_back({*first, share * static_cast<float>(last - first)});
+    first = last;
+  }
   for (const int bin : open_bins) row.sky.push_back({bin, kPi * share});
   row.escaped = static_cast<float>(escaped) * share;
   row.harmonic_distance = inverse_distance > 0 ? static_cast<float>(exposed / inverse_distance) : Ray::kInfinity;
@@ -103,7 +107,7 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
     float highest = -1;
     for (const glm::vec3& corner : t.corner)
       highest = std::max(highest, glm::dot(corner - middle.position, middle.normal));
-    if (highest <= 0) continue;
+    if (highest < 0) continue;
     importance[k] = triangle_from(t, middle.position).solid_angle() + 1e-9;
     total += importance[k];
   }
@@ -162,8 +166,7 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
     if (blocked[i] || segments[i].t_far <= 0) continue;
     if (const Panel* panel = panels_.at(candidates[i].face)) {
       if (glm::dot(segments[i].direction, mesh_.faces().faces[panel->face].normal) > 0)
-        row.sky.push_back(
-            {sky_.count() + panels_.bin(*panel, -segments[i].direction), scale * candidates[i].weight});
+        row.sky.push_back({sky_.count() + panels_.bin(*panel, -segments[i].direction), scale * candidates[i].weight});
       continue;
     }
     segments[kept] = segments[i];
@@ -190,7 +193,7 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
     if (hits[i].face < 0)
       row.sky.push_back({sky_(segments[i].direction), weight});
     else if (!mesh_.faces().is_inside_solid(hits[i].face, hits[i].side))
-      row.through.push_back({mesh_.element_at(hits[i]), weight / kPi});
+      row.through.push_back({mesh_.slot_at(hits[i]), weight / kPi});
   }
 }
 
@@ -203,19 +206,16 @@ GatherRow Gatherer::surroundings_of_point(const Node& point, GatherSamples sampl
 void Gatherer::look_through_openings(const Node& point, GatherSamples samples, std::uint32_t seed,
                                      GatherRow& row) const {
   const Origin origin{point.position, point.normal};
-  gather_openings(origin, [&](glm::vec2) { return origin; }, samples.openings, seed, row);
+  gather_openings(
+      origin, [&](glm::vec2) { return origin; }, samples.openings, seed, row);
   merge_shares(row.through);
   merge_shares(row.sky);
 }
 
-// A place of a patch from two uniform numbers.
-auto Gatherer::places_on(int slot_index) const {
-  const Slot slot = mesh_.slot(slot_index);
-  const Face& face = mesh_.faces().faces[slot.face];
-  const glm::vec3 normal = slot.side == 0 ? face.normal : -face.normal;
-  return [this, slot, normal](glm::vec2 u) {
-    const glm::vec2 st = mesh_.cell_parameters(slot.face, slot.cell, mesh_.sample_local(slot.face, u));
-    return Origin{mesh_.lifted_position(slot.face, slot.side, st), normal};
+auto Gatherer::places_on(int slot) const {
+  return [this, slot](glm::vec2 u) {
+    const Node place = mesh_.place_on(slot, u);
+    return Origin{place.position, place.normal};
   };
 }
 
@@ -225,13 +225,9 @@ GatherRow Gatherer::surroundings_of_patch(int slot, GatherSamples samples, std::
   return row;
 }
 
-void Gatherer::look_through_openings(int slot_index, GatherSamples samples, std::uint32_t seed, GatherRow& row) const {
-  const Slot slot = mesh_.slot(slot_index);
-  const auto origin_of = places_on(slot_index);
-  const glm::vec2 middle = mesh_.grid(slot.face).is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3);
-  const Origin centre{mesh_.lifted_position(slot.face, slot.side, mesh_.cell_parameters(slot.face, slot.cell, middle)),
-                      origin_of(glm::vec2(0)).normal};
-  gather_openings(centre, origin_of, samples.openings, seed, row);
+void Gatherer::look_through_openings(int slot, GatherSamples samples, std::uint32_t seed, GatherRow& row) const {
+  const Node middle = mesh_.middle_of(slot);
+  gather_openings({middle.position, middle.normal}, places_on(slot), samples.openings, seed, row);
   merge_shares(row.through);
   merge_shares(row.sky);
 }

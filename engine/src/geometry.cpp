@@ -1,12 +1,12 @@
 #include "transom/geometry.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <numeric>
 #include <sstream>
-#include <tuple>
+
+#include <oneapi/tbb/parallel_sort.h>
 
 #include "transom/error.h"
 #include "transom/face_pieces.h"
@@ -29,13 +29,23 @@ bool all_finite(glm::dvec3 v) {
 
 // Vertices at the same place are one, so that a mesh is closed even where a file repeats its vertices.
 std::vector<int> weld_vertices(const std::vector<glm::dvec3>& vertices, double tolerance) {
-  std::map<std::array<long long, 3>, int> place_of;
-  std::vector<int> welded(vertices.size());
+  struct Place {
+    long long x, y, z;
+    int vertex;
+    auto operator<=>(const Place&) const = default;
+    bool is_near(const Place& other) const { return x == other.x && y == other.y && z == other.z; }
+  };
+  std::vector<Place> places(vertices.size());
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const glm::dvec3 cell = glm::round(vertices[i] / tolerance);
-    const std::array<long long, 3> key{static_cast<long long>(cell.x), static_cast<long long>(cell.y),
-                                       static_cast<long long>(cell.z)};
-    welded[i] = place_of.try_emplace(key, static_cast<int>(i)).first->second;
+    places[i] = {static_cast<long long>(cell.x), static_cast<long long>(cell.y), static_cast<long long>(cell.z),
+                 static_cast<int>(i)};
+  }
+  oneapi::tbb::parallel_sort(places.begin(), places.end());
+  std::vector<int> welded(vertices.size());
+  for (std::size_t i = 0, first = 0; i < places.size(); ++i) {
+    if (!places[i].is_near(places[first])) first = i;
+    welded[places[i].vertex] = places[first].vertex;
   }
   return welded;
 }
@@ -45,37 +55,58 @@ int find_root(std::vector<int>& parent, int i) {
   return i;
 }
 
+// An edge of a face, from the smaller vertex to the larger.
+struct Edge {
+  int low, high;
+  int face;
+  int direction;  // 1 or -1: the way in which the face passes it
+  auto operator<=>(const Edge&) const = default;
+};
+
+// All edges of all faces, equal ones together.
+std::vector<Edge> sorted_edges(const SceneGeometry& scene, const std::vector<int>& welded) {
+  std::vector<Edge> edges;
+  edges.reserve(4 * scene.faces.size());
+  for (std::size_t f = 0; f < scene.faces.size(); ++f) {
+    const glm::ivec4& face = scene.faces[f];
+    const int count = face.w >= 0 ? 4 : 3;
+    for (int k = 0; k < count; ++k) {
+      const int a = welded[face[k]], b = welded[face[(k + 1) % count]];
+      if (a != b) edges.push_back({std::min(a, b), std::max(a, b), static_cast<int>(f), a < b ? 1 : -1});
+    }
+  }
+  oneapi::tbb::parallel_sort(edges.begin(), edges.end());
+  return edges;
+}
+
 // Faces of closed, outward-looking shells: every directed edge is met once by its reverse, and the volume is positive.
 // Shells hold together through edges of two faces: a box whose corner, or edge, touches another surface is its own.
 void mark_solids(const SceneGeometry& scene, Faces& result) {
-  const std::vector<int> welded = weld_vertices(scene.vertices, 1e-7 * result.extent);
   const std::size_t face_count = scene.faces.size();
-  std::map<std::pair<int, int>, std::vector<int>> sharers;  // faces by edge, from the smaller vertex to the larger
-  const auto each_edge = [&](std::size_t f, const auto& body) {
-    const glm::ivec4& face = scene.faces[f];
-    const int count = face.w >= 0 ? 4 : 3;
-    for (int k = 0; k < count; ++k) body(welded[face[k]], welded[face[(k + 1) % count]]);
+  const std::vector<Edge> edges = sorted_edges(scene, weld_vertices(scene.vertices, 1e-7 * result.extent));
+  const auto each_edge = [&](const auto& body) {  // body(first, last) for the faces at each edge
+    for (std::size_t first = 0, last = 0; first < edges.size(); first = last) {
+      while (last < edges.size() && edges[last].low == edges[first].low && edges[last].high == edges[first].high)
+        ++last;
+      body(first, last);
+    }
   };
-  for (std::size_t f = 0; f < face_count; ++f)
-    each_edge(f, [&](int a, int b) { sharers[{std::min(a, b), std::max(a, b)}].push_back(static_cast<int>(f)); });
   std::vector<int> parent(face_count);
   std::iota(parent.begin(), parent.end(), 0);
-  for (const auto& [edge, faces] : sharers)
-    if (faces.size() == 2) parent[find_root(parent, faces[0])] = find_root(parent, faces[1]);
-
+  each_edge([&](std::size_t first, std::size_t last) {
+    if (last - first == 2) parent[find_root(parent, edges[first].face)] = find_root(parent, edges[first + 1].face);
+  });
   std::vector<double> volume(face_count, 0.0);
   std::vector<char> closed(face_count, 1);
-  for (std::size_t f = 0; f < face_count; ++f)
-    each_edge(f, [&](int a, int b) {
-      const int root = find_root(parent, static_cast<int>(f));
+  each_edge([&](std::size_t first, std::size_t last) {
+    for (std::size_t k = first; k < last; ++k) {
+      const int root = find_root(parent, edges[k].face);
       int balance = 0;  // of the shell's directions along the edge
-      for (const int other : sharers[{std::min(a, b), std::max(a, b)}]) {
-        if (find_root(parent, other) != root) continue;
-        each_edge(static_cast<std::size_t>(other),
-                  [&](int c, int d) { balance += (c == a && d == b) - (c == b && d == a); });
-      }
+      for (std::size_t other = first; other < last; ++other)
+        if (find_root(parent, edges[other].face) == root) balance += edges[other].direction;
       if (balance != 0) closed[root] = 0;
-    });
+    }
+  });
   for (std::size_t f = 0; f < face_count; ++f) {
     const glm::ivec4& face = scene.faces[f];
     const int count = face.w >= 0 ? 4 : 3;

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <sstream>
 
+#include "transom/box_tree.h"
 #include "transom/error.h"
+#include "transom/parallel.h"
 #include "transom/sampling.h"
 
 namespace transom {
@@ -17,10 +18,6 @@ constexpr double kLeastExtent2 = 1e-5;       // of the scene's extent squared: a
 constexpr std::uint32_t kRayCount = 16;
 constexpr std::uint32_t kSeed = 1;  // of a check: the same scene is always right or wrong
 
-struct Box {
-  glm::vec3 low, high;
-};
-
 int corner_count(const Face& face) {
   return face.is_quad ? 4 : 3;
 }
@@ -28,10 +25,10 @@ int corner_count(const Face& face) {
 Box box_of(const Face& face, float margin) {
   Box box{face.corner[0], face.corner[0]};
   for (int k = 1; k < corner_count(face); ++k) {
-    box.low = glm::min(box.low, face.corner[k]);
-    box.high = glm::max(box.high, face.corner[k]);
+    box.low = glm::min(box.low, glm::dvec3(face.corner[k]));
+    box.high = glm::max(box.high, glm::dvec3(face.corner[k]));
   }
-  return {box.low - margin, box.high + margin};
+  return {box.low - static_cast<double>(margin), box.high + static_cast<double>(margin)};
 }
 
 // Area and middle of the part of a face that lies over another, projected along the other's normal [Sutherland &
@@ -85,48 +82,54 @@ bool is_lit(const Faces& faces, const std::vector<char>& is_indoors, const RaySc
   return false;
 }
 
+// Area and middle of what two faces in one plane share, where light meets it; 0: they do not lie on each other.
+double lit_overlap(const Faces& faces, const std::vector<char>& is_indoors, const RayScene& rays, int a, int b,
+                   glm::dvec3& middle) {
+  const float margin = faces.ray_offset();
+  const Face &first = faces.faces[a], &second = faces.faces[b];
+  if (first.source == second.source || !(is_indoors[a] || is_indoors[b]) ||
+      std::abs(glm::dot(first.normal, second.normal)) < kParallelCosine)
+    return 0;
+  const auto off_plane = [&](glm::vec3 p) { return std::abs(glm::dot(p - first.corner[0], first.normal)); };
+  if (std::max({off_plane(second.corner[0]), off_plane(second.corner[1]),
+                off_plane(second.corner[corner_count(second) - 1])}) > margin)
+    return 0;
+  const double area = overlap_area(second, first, middle);
+  if (area <= std::max(kLeastShare * std::min(first.area, second.area), kLeastExtent2 * faces.extent * faces.extent))
+    return 0;
+  return is_lit(faces, is_indoors, rays, glm::vec3(middle), first.normal) ? area : 0;
+}
+
 }  // namespace
 
 void check_overlaps(const Faces& faces, const std::vector<char>& is_indoors, const RayScene& rays) {
   const float margin = faces.ray_offset();
   const std::size_t count = faces.faces.size();
-  std::vector<Box> boxes;
-  boxes.reserve(count);
-  for (const Face& face : faces.faces) boxes.push_back(box_of(face, 0.5f * margin));
-  std::vector<int> order(count);
-  std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](int a, int b) { return boxes[a].low.x < boxes[b].low.x; });
-  std::vector<int> open;  // faces whose boxes reach the present one
-  for (const int b : order) {
-    std::erase_if(open, [&](int a) { return boxes[a].high.x < boxes[b].low.x; });
-    for (const int a : open) {
-      const Face &first = faces.faces[a], &second = faces.faces[b];
-      if (first.source == second.source || !(is_indoors[a] || is_indoors[b])) continue;
-      if (glm::any(glm::greaterThan(boxes[a].low, boxes[b].high)) ||
-          glm::any(glm::greaterThan(boxes[b].low, boxes[a].high)) ||
-          std::abs(glm::dot(first.normal, second.normal)) < kParallelCosine)
-        continue;
-      const auto off_plane = [&](glm::vec3 p) { return std::abs(glm::dot(p - first.corner[0], first.normal)); };
-      const float distance = std::max({off_plane(second.corner[0]), off_plane(second.corner[1]),
-                                       off_plane(second.corner[corner_count(second) - 1])});
-      if (distance > margin) continue;
+  std::vector<Box> boxes(count);
+  for (std::size_t f = 0; f < count; ++f) boxes[f] = box_of(faces.faces[f], 0.5f * margin);
+  const BoxTree tree(boxes);
+  std::vector<int> partner(count, -1);  // the first face that each lies on
+  parallel_indices(count, 64, [&](std::size_t b) {
+    tree.visit(boxes[b], [&](int a) {
       glm::dvec3 middle(0);
-      const double area = overlap_area(second, first, middle);
-      if (area <=
-          std::max(kLeastShare * std::min(first.area, second.area), kLeastExtent2 * faces.extent * faces.extent))
-        continue;
-      if (!is_lit(faces, is_indoors, rays, glm::vec3(middle), first.normal)) continue;
-      middle += faces.origin;
-      const auto [low, high] = std::minmax(first.source, second.source);
-      std::ostringstream text;
-      text.precision(3);
-      text << "face " << high << ", lies in the plane of face " << low << ", and on " << area << " m² of it, near ("
-           << middle.x << ", " << middle.y << ", " << middle.z
-           << ") m: which of the two light meets would be chance. Delete one of them, cut a hole, or move it off by "
-           << 2 * margin << " m";
-      throw InputError(text.str());
-    }
-    open.push_back(b);
+      if (a < static_cast<int>(b) && (partner[b] < 0 || a < partner[b]) &&
+          lit_overlap(faces, is_indoors, rays, a, static_cast<int>(b), middle) > 0)
+        partner[b] = a;
+    });
+  });
+  for (std::size_t b = 0; b < count; ++b) {
+    if (partner[b] < 0) continue;
+    glm::dvec3 middle(0);
+    const double area = lit_overlap(faces, is_indoors, rays, partner[b], static_cast<int>(b), middle);
+    middle += faces.origin;
+    const auto [low, high] = std::minmax(faces.faces[partner[b]].source, faces.faces[b].source);
+    std::ostringstream text;
+    text.precision(3);
+    text << "face " << high << ", lies in the plane of face " << low << ", and on " << area << " m² of it, near ("
+         << middle.x << ", " << middle.y << ", " << middle.z
+         << ") m: which of the two light meets would be chance. Delete one of them, cut a hole, or move it off by "
+         << 2 * margin << " m";
+    throw InputError(text.str());
   }
 }
 

@@ -46,7 +46,7 @@ std::vector<GatherRow> gather_outside(const Panels& panels, const Panel& panel, 
       if (hits[i].face < 0)
         row.sky.push_back({sky(rays[i].direction), weight * transmitted[i]});
       else if (!mesh.faces().is_inside_solid(hits[i].face, hits[i].side))
-        row.through.push_back({mesh.element_at(hits[i]), weight * transmitted[i] / std::numbers::pi_v<float>});
+        row.through.push_back({mesh.slot_at(hits[i]), weight * transmitted[i] / std::numbers::pi_v<float>});
     }
     merge_shares(row.sky);
     merge_shares(row.through);

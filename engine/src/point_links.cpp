@@ -55,11 +55,15 @@ PointLinks::PointLinks(const LightMesh& mesh, const RayScene& rays, const std::v
 }
 
 // The middle of the elements of a patch that do not lie inside a solid, moved to the nearest of their own middles.
-glm::vec3 PointLinks::exposed_middle(int slot_index, glm::vec3 normal) const {
+glm::vec3 PointLinks::exposed_middle(int slot_index) const {
   const int element_count = mesh_.elements_per_slot();
   std::vector<Ray> outwards;
-  for (int e = 0; e < element_count; ++e)
-    outwards.push_back({element_shape(mesh_, slot_index * element_count + e).middle, normal});
+  for (int e = 0; e < element_count; ++e) {
+    const int element = slot_index * element_count + e;
+    if (!(mesh_.element_area(element) > 0)) continue;
+    const Node middle = mesh_.middle_of_element(element);
+    outwards.push_back({middle.position, middle.normal});
+  }
   std::vector<Hit> hits(outwards.size());
   rays_.intersect(RayScene::What::kOpaque, outwards, hits, RayScene::Order::kCoherent);
   glm::vec3 sum(0), all(0);
@@ -70,7 +74,8 @@ glm::vec3 PointLinks::exposed_middle(int slot_index, glm::vec3 normal) const {
     sum += outwards[e].origin;
     outwards[static_cast<std::size_t>(count++)] = outwards[e];
   }
-  if (count == 0 || count == element_count) return all / static_cast<float>(element_count);
+  const bool is_planar = !mesh_.is_cluster(slot_index);
+  if (count == 0 || (is_planar && count == element_count)) return all / static_cast<float>(outwards.size());
   sum /= static_cast<float>(count);
   return std::min_element(
              outwards.begin(), outwards.begin() + count,
@@ -104,10 +109,8 @@ std::shared_ptr<const PointLinks::Link> PointLinks::link(int slot_index, const K
     before = known.links->links_[slot_index];
   }
   if (before && known.has_same_points && (known.has_same_glazing || before->glazed_point.empty())) return before;
-  const Slot slot = mesh_.slot(slot_index);
-  const Face& face = mesh_.faces().faces[slot.face];
-  const glm::vec3 normal = slot.side == 0 ? face.normal : -face.normal, middle = exposed_middle(slot_index, normal);
-  const float size2 = 2 * mesh_.cell_area(slot.face, slot.cell), size = std::sqrt(size2);
+  const glm::vec3 normal = mesh_.normal_of(slot_index), middle = exposed_middle(slot_index);
+  const float size2 = 2 * mesh_.slot_area(slot_index), size = std::sqrt(size2);
   auto link = std::make_shared<Link>();
   std::vector<int> far_points;
   std::vector<float> height(kBlock), distance2(kBlock), cosine(kBlock);
@@ -127,15 +130,14 @@ std::shared_ptr<const PointLinks::Link> PointLinks::link(int slot_index, const K
   }
   const KnownPoints known_points{before.get(), known};
   link_far(*link, middle, far_points, known_points);
-  link_near(*link, slot_index, normal, known_points);
+  link_near(*link, slot_index, known_points);
   // What is taken over may be glazed, too.
   for (int i = 0; before && known.has_same_glazing && i < static_cast<int>(point_count_); ++i)
     if (known.point[i] >= 0 &&
         std::binary_search(before->glazed_point.begin(), before->glazed_point.end(), known.point[i]))
       link->glazed_point.push_back(i);
   std::sort(link->glazed_point.begin(), link->glazed_point.end());
-  link->glazed_point.erase(std::unique(link->glazed_point.begin(), link->glazed_point.end()),
-                           link->glazed_point.end());
+  link->glazed_point.erase(std::unique(link->glazed_point.begin(), link->glazed_point.end()), link->glazed_point.end());
   return link;
 }
 
@@ -171,7 +173,7 @@ void PointLinks::link_far(Link& link, glm::vec3 middle, const std::vector<int>& 
   }
 }
 
-void PointLinks::link_near(Link& link, int slot, glm::vec3 normal, const KnownPoints& known) const {
+void PointLinks::link_near(Link& link, int slot, const KnownPoints& known) const {
   const auto element_count = static_cast<std::size_t>(mesh_.elements_per_slot());
   std::vector<ElementShape> shapes;
   for (std::size_t e = 0; e < element_count; ++e)
@@ -191,7 +193,7 @@ void PointLinks::link_near(Link& link, int slot, glm::vec3 normal, const KnownPo
     const glm::vec3 point(x_[i], y_[i], z_[i]), point_normal(nx_[i], ny_[i], nz_[i]);
     bool any = false;
     for (const ElementShape& shape : shapes) {
-      weights.push_back(element_share(point, point_normal, shape, normal));
+      weights.push_back(element_share(point, point_normal, shape));
       any |= weights.back() > 0;
     }
     if (!any) {
@@ -245,8 +247,7 @@ std::vector<std::shared_ptr<const PointLinks::Link>> PointLinks::links_of(const 
     }
   }
   if (missing.empty()) return found;
-  parallel_indices(missing.size(), 1,
-                   [&](std::size_t k) { found[missing[k]] = link(slots[missing[k]], known); });
+  parallel_indices(missing.size(), 1, [&](std::size_t k) { found[missing[k]] = link(slots[missing[k]], known); });
   const std::lock_guard lock(mutex_);
   for (const std::size_t k : missing) {
     const Link& made = *found[k];
@@ -263,19 +264,14 @@ std::vector<std::shared_ptr<const PointLinks::Link>> PointLinks::links_of(const 
 
 PointLinks::LitPatch PointLinks::lit_patch(std::span<const BrightElement> bright, std::size_t first,
                                            std::size_t last) const {
-  const int per_slot = mesh_.elements_per_slot(), slot_index = bright[first].element / per_slot;
-  const Slot slot = mesh_.slot(slot_index);
-  const Face& face = mesh_.faces().faces[slot.face];
-  const glm::vec2 middle = mesh_.grid(slot.face).is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3);
-  LitPatch patch{nullptr, first, last, glm::vec3(0), slot.side == 0 ? face.normal : -face.normal, glm::vec3(0)};
+  const int slot = bright[first].element / mesh_.elements_per_slot();
+  LitPatch patch{nullptr, first, last, glm::vec3(0), mesh_.normal_of(slot), glm::vec3(0)};
   float sum = 0;
   for (std::size_t k = first; k < last; ++k) {
-    const int element = bright[k].element % per_slot;
-    const float area = mesh_.element_area(slot.face, slot.cell, element);
+    const float area = mesh_.element_area(bright[k].element);
     const glm::vec3 radiosity = bright[k].radiosity;
     const float weight = area * (radiosity.x + radiosity.y + radiosity.z);
-    patch.centroid += weight * mesh_.lifted_position(slot.face, slot.side,
-                                                     mesh_.element_parameters(slot.face, slot.cell, element, middle));
+    patch.centroid += weight * mesh_.middle_of_element(bright[k].element).position;
     patch.flux += area / kPi * radiosity;
     sum += weight;
   }
@@ -283,7 +279,55 @@ PointLinks::LitPatch PointLinks::lit_patch(std::span<const BrightElement> bright
   return patch;
 }
 
-void PointLinks::add_irradiance(std::span<const BrightElement> bright, std::vector<glm::vec3>& irradiance) const {
+// What lit patches send to the points of a few blocks.
+template <bool kIsGrey>
+void PointLinks::add_blocks(const std::vector<LitPatch>& lit, std::span<const BrightElement> bright, std::size_t chunk,
+                            std::vector<glm::vec3>& irradiance) const {
+  const int per_slot = mesh_.elements_per_slot();
+  const std::size_t block_count = x_.size() / kBlock;
+  const std::size_t first_block = chunk * kBlocksAtOnce,
+                    last_block = std::min(block_count, first_block + kBlocksAtOnce), base = first_block * kBlock;
+  float red[kBlocksAtOnce * kBlock] = {}, green[kBlocksAtOnce * kBlock] = {}, blue[kBlocksAtOnce * kBlock] = {};
+  for (const LitPatch& patch : lit) {
+    const Link& link = *patch.link;
+    const glm::vec3 c = patch.centroid, m = patch.normal, flux = patch.flux;
+    auto block = std::lower_bound(link.block.begin(), link.block.end(), static_cast<int>(first_block));
+    for (; block != link.block.end() && *block < static_cast<int>(last_block); ++block) {
+      const std::uint8_t* seen = &link.seen[static_cast<std::size_t>(block - link.block.begin()) * kBlock];
+      const std::size_t from = static_cast<std::size_t>(*block) * kBlock, to = from - base;
+      for (std::size_t k = 0; k < kBlock; ++k) {
+        const float dx = c.x - x_[from + k], dy = c.y - y_[from + k], dz = c.z - z_[from + k];
+        const float height = std::max(0.f, -(dx * m.x + dy * m.y + dz * m.z));
+        const float cosine = std::max(0.f, dx * nx_[from + k] + dy * ny_[from + k] + dz * nz_[from + k]);
+        const float distance2 = std::max(kLeastDistance2, dx * dx + dy * dy + dz * dz);
+        const float root = static_cast<float>(static_cast<int>(seen[k])) * (1.f / 255);
+        const float weight = height * cosine * root * root / (distance2 * distance2);
+        red[to + k] += weight * flux.x;
+        if constexpr (!kIsGrey) {
+          green[to + k] += weight * flux.y;
+          blue[to + k] += weight * flux.z;
+        }
+      }
+    }
+    auto near = std::lower_bound(link.near_point.begin(), link.near_point.end(), static_cast<int>(base));
+    for (; near != link.near_point.end() && *near < static_cast<int>(last_block * kBlock); ++near) {
+      const float* weight = &link.near_weight[static_cast<std::size_t>(near - link.near_point.begin()) * per_slot];
+      glm::vec3 sum(0);
+      for (std::size_t k = patch.first_bright; k < patch.last_bright; ++k)
+        sum += weight[bright[k].element % per_slot] * bright[k].radiosity;
+      const std::size_t to = static_cast<std::size_t>(*near) - base;
+      red[to] += sum.x;
+      green[to] += sum.y;
+      blue[to] += sum.z;
+    }
+  }
+  const std::size_t count = std::min(point_count_, last_block * kBlock) - base;
+  for (std::size_t k = 0; k < count; ++k)
+    irradiance[base + k] += kIsGrey ? glm::vec3(red[k]) : glm::vec3(red[k], green[k], blue[k]);
+}
+
+void PointLinks::add_irradiance(std::span<const BrightElement> bright, bool is_grey,
+                                std::vector<glm::vec3>& irradiance) const {
   const int per_slot = mesh_.elements_per_slot();
   std::vector<int> slots;
   for (const BrightElement& b : bright)
@@ -298,44 +342,12 @@ void PointLinks::add_irradiance(std::span<const BrightElement> bright, std::vect
     lit[k].link = links[k];
   });
 
-  const std::size_t block_count = x_.size() / kBlock;
-  parallel_indices((block_count + kBlocksAtOnce - 1) / kBlocksAtOnce, 1, [&](std::size_t chunk) {
-    const std::size_t first_block = chunk * kBlocksAtOnce,
-                      last_block = std::min(block_count, first_block + kBlocksAtOnce), base = first_block * kBlock;
-    float red[kBlocksAtOnce * kBlock] = {}, green[kBlocksAtOnce * kBlock] = {}, blue[kBlocksAtOnce * kBlock] = {};
-    for (const LitPatch& patch : lit) {
-      const Link& link = *patch.link;
-      const glm::vec3 c = patch.centroid, m = patch.normal, flux = patch.flux;
-      auto block = std::lower_bound(link.block.begin(), link.block.end(), static_cast<int>(first_block));
-      for (; block != link.block.end() && *block < static_cast<int>(last_block); ++block) {
-        const std::uint8_t* seen = &link.seen[static_cast<std::size_t>(block - link.block.begin()) * kBlock];
-        const std::size_t from = static_cast<std::size_t>(*block) * kBlock, to = from - base;
-        for (std::size_t k = 0; k < kBlock; ++k) {
-          const float dx = c.x - x_[from + k], dy = c.y - y_[from + k], dz = c.z - z_[from + k];
-          const float height = std::max(0.f, -(dx * m.x + dy * m.y + dz * m.z));
-          const float cosine = std::max(0.f, dx * nx_[from + k] + dy * ny_[from + k] + dz * nz_[from + k]);
-          const float distance2 = std::max(kLeastDistance2, dx * dx + dy * dy + dz * dz);
-          const float root = static_cast<float>(static_cast<int>(seen[k])) * (1.f / 255);
-          const float weight = height * cosine * root * root / (distance2 * distance2);
-          red[to + k] += weight * flux.x;
-          green[to + k] += weight * flux.y;
-          blue[to + k] += weight * flux.z;
-        }
-      }
-      auto near = std::lower_bound(link.near_point.begin(), link.near_point.end(), static_cast<int>(base));
-      for (; near != link.near_point.end() && *near < static_cast<int>(last_block * kBlock); ++near) {
-        const float* weight = &link.near_weight[static_cast<std::size_t>(near - link.near_point.begin()) * per_slot];
-        glm::vec3 sum(0);
-        for (std::size_t k = patch.first_bright; k < patch.last_bright; ++k)
-          sum += weight[bright[k].element % per_slot] * bright[k].radiosity;
-        const std::size_t to = static_cast<std::size_t>(*near) - base;
-        red[to] += sum.x;
-        green[to] += sum.y;
-        blue[to] += sum.z;
-      }
-    }
-    const std::size_t count = std::min(point_count_, last_block * kBlock) - base;
-    for (std::size_t k = 0; k < count; ++k) irradiance[base + k] += glm::vec3(red[k], green[k], blue[k]);
+  const std::size_t chunk_count = (x_.size() / kBlock + kBlocksAtOnce - 1) / kBlocksAtOnce;
+  parallel_indices(chunk_count, 1, [&](std::size_t chunk) {
+    if (is_grey)
+      add_blocks<true>(lit, bright, chunk, irradiance);
+    else
+      add_blocks<false>(lit, bright, chunk, irradiance);
   });
 }
 

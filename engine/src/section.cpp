@@ -15,7 +15,8 @@ namespace {
 constexpr double kThin = 1e-12;       // of a beam: a part so narrow is left to its neighbour
 constexpr double kAlongAxis = 1e-12;  // of a direction, across the extrusion: light that never leaves
 constexpr int kEvenDecisions = 4;     // of a path; further ones are independent of other rays
-constexpr std::size_t kGrain = 64;    // rays of a parallel task
+constexpr std::size_t kFewBlocks = 2;
+constexpr std::size_t kGrain = 64;  // rays of a parallel task
 
 /// Parallel light from the points of start -> end, or one ray where these are one.
 struct Path {
@@ -269,10 +270,14 @@ ProductLight trace_section(const Section& section, glm::dvec3 direction, TraceOp
       tracer.beams({{0, start_z}, {section.period, start_z}, direction, perpendicular(direction), {}});
   const std::size_t blocks = (rays.size() + kGrain - 1) / kGrain;
   std::vector<ExitSorter> sorters(blocks, ExitSorter(direction.z > 0));
-  parallel_indices(blocks, 1, [&](std::size_t block) {
+  const auto follow = [&](std::size_t block) {
     for (std::size_t k = block * kGrain; k < std::min(rays.size(), (block + 1) * kGrain); ++k)
       tracer.ray(rays[k], sorters[block]);
-  });
+  };
+  if (blocks > kFewBlocks)
+    parallel_indices(blocks, 1, follow);
+  else  // not worth waking other threads
+    for (std::size_t block = 0; block < blocks; ++block) follow(block);
   for (const ExitSorter& sorter : sorters) tracer.exits.append(sorter);
   return tracer.exits.light();
 }

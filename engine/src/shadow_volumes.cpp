@@ -91,6 +91,20 @@ void check_camera(const VolumeCamera& camera) {
 
 }  // namespace
 
+struct VolumeCasters::Prepared {
+  Prepared(std::vector<glm::vec3> points, std::span<const glm::uvec3> triangles, bool are_solids)
+      : vertices(std::move(points)),
+        casters(vertices, weld_vertices(vertices), triangles,
+                are_solids ? CasterCount::kSolidsOnce : CasterCount::kEveryTriangle) {}
+  std::vector<glm::vec3> vertices;
+  ShadowCasters casters;
+};
+
+VolumeCasters::VolumeCasters(std::vector<glm::vec3> vertices, std::span<const glm::uvec3> triangles, bool are_solids)
+    : prepared_(std::make_unique<Prepared>(std::move(vertices), triangles, are_solids)) {}
+VolumeCasters::~VolumeCasters() = default;
+VolumeCasters::VolumeCasters(VolumeCasters&&) noexcept = default;
+
 class ShadowVolumes::Impl {
  public:
   Impl(GlContext& context, std::span<const glm::vec3> vertices, std::span<const glm::uvec3> opaque_triangles,
@@ -100,19 +114,24 @@ class ShadowVolumes::Impl {
   Impl& operator=(const Impl&) = delete;
 
   BeamMask render(const VolumeCamera& camera, glm::dvec3 direction_to_sun);
+  std::vector<std::uint8_t> count(const VolumeCamera& camera, glm::dvec3 direction_to_source,
+                                  const std::vector<glm::vec3>& vertices, const ShadowCasters& casters);
   int pass_count() const { return pass_count_; }
 
  private:
   struct Opening {
     ShadowCasters casters;
-    std::vector<std::uint32_t> vertices;
+    std::vector<glm::vec3> corners;
   };
 
   void create_objects();
   void delete_objects();
   void resize(int width, int height);
+  glm::dvec3 begin(const VolumeCamera& camera, glm::dvec3 direction_to_sun);
   void draw_visible_depth(const VolumeCamera& camera);
-  bool light_reaches_picture(const Opening& opening, glm::dvec3 direction_to_sun) const;
+  void upload(GLuint array, GLuint buffer, const std::vector<glm::vec3>& vertices, glm::dvec3 sun, GLenum use) const;
+  void check_errors();
+  bool light_reaches_picture(std::span<const glm::vec3> corners, glm::dvec3 direction_to_sun) const;
   std::vector<std::uint8_t> count_crossings(const VolumeTriangles& volume);
   std::vector<std::uint8_t> read_stencil() const;
   void draw(std::size_t first, std::size_t count) const;
@@ -126,6 +145,7 @@ class ShadowVolumes::Impl {
   std::vector<Opening> openings_;
 
   GLuint program_ = 0, vertex_array_ = 0, vertex_buffer_ = 0, surface_buffer_ = 0, volume_buffer_ = 0;
+  GLuint other_array_ = 0, other_buffer_ = 0;  // of casters that are not the scene's
   GLuint framebuffer_ = 0, depth_stencil_ = 0;
   GLint clip_from_world_location_ = -1;
 
@@ -157,7 +177,8 @@ ShadowVolumes::Impl::Impl(GlContext& context, std::span<const glm::vec3> vertice
   for (const std::vector<glm::uvec3>& triangles : opening_triangles_by_group) {
     check_indices(triangles);
     Opening opening{ShadowCasters(vertices, welded_, triangles, CasterCount::kEveryTriangle), {}};
-    for (const glm::uvec3& t : triangles) opening.vertices.insert(opening.vertices.end(), {t.x, t.y, t.z});
+    for (const glm::uvec3& t : triangles)
+      opening.corners.insert(opening.corners.end(), {vertices[t.x], vertices[t.y], vertices[t.z]});
     openings_.push_back(std::move(opening));
   }
   const GlContext::Scope scope(context_);
@@ -182,18 +203,11 @@ void ShadowVolumes::Impl::create_objects() {
   program_ = link_program(gl_);
   clip_from_world_location_ = gl_.GetUniformLocation(program_, "clip_from_world");
 
-  std::vector<glm::vec4> positions;
-  positions.reserve(vertices_.size() + 1);
-  for (const glm::vec3& vertex : vertices_) positions.emplace_back(vertex, 1.0F);
-  positions.emplace_back(0.0F);  // the point at infinity, set by each render
+  gl_.GenVertexArrays(1, &other_array_);
+  gl_.GenBuffers(1, &other_buffer_);
   gl_.GenVertexArrays(1, &vertex_array_);
-  gl_.BindVertexArray(vertex_array_);
   gl_.GenBuffers(1, &vertex_buffer_);
-  gl_.BindBuffer(GL_ARRAY_BUFFER, vertex_buffer_);
-  gl_.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(positions.size() * sizeof(glm::vec4)), positions.data(),
-                 GL_STATIC_DRAW);
-  gl_.EnableVertexAttribArray(0);
-  gl_.VertexAttribPointer(0, 4, GL_FLOAT, GL_FALSE, sizeof(glm::vec4), nullptr);
+  upload(vertex_array_, vertex_buffer_, vertices_, glm::dvec3(0), GL_STATIC_DRAW);  // the sun is set by each render
 
   gl_.GenBuffers(1, &surface_buffer_);
   gl_.BindBuffer(GL_ELEMENT_ARRAY_BUFFER, surface_buffer_);
@@ -204,10 +218,25 @@ void ShadowVolumes::Impl::create_objects() {
   gl_.GenRenderbuffers(1, &depth_stencil_);
 }
 
+// Vertices and, after them, the point at infinity away from the sun.
+void ShadowVolumes::Impl::upload(GLuint array, GLuint buffer, const std::vector<glm::vec3>& vertices, glm::dvec3 sun,
+                                 GLenum use) const {
+  std::vector<glm::vec4> positions;
+  positions.reserve(vertices.size() + 1);
+  for (const glm::vec3& vertex : vertices) positions.emplace_back(vertex, 1.0F);
+  positions.emplace_back(-sun, 0.0F);
+  gl_.BindVertexArray(array);
+  gl_.BindBuffer(GL_ARRAY_BUFFER, buffer);
+  gl_.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(positions.size() * sizeof(glm::vec4)), positions.data(), use);
+  gl_.EnableVertexAttribArray(0);
+  gl_.VertexAttribPointer(0, 4, GL_FLOAT, GL_FALSE, sizeof(glm::vec4), nullptr);
+}
+
 void ShadowVolumes::Impl::delete_objects() {
   gl_.DeleteProgram(program_);
-  gl_.DeleteVertexArrays(1, &vertex_array_);
-  for (const GLuint buffer : {vertex_buffer_, surface_buffer_, volume_buffer_}) gl_.DeleteBuffers(1, &buffer);
+  for (const GLuint array : {vertex_array_, other_array_}) gl_.DeleteVertexArrays(1, &array);
+  for (const GLuint buffer : {vertex_buffer_, surface_buffer_, volume_buffer_, other_buffer_})
+    gl_.DeleteBuffers(1, &buffer);
   gl_.DeleteFramebuffers(1, &framebuffer_);
   gl_.DeleteRenderbuffers(1, &depth_stencil_);
 }
@@ -244,18 +273,17 @@ void ShadowVolumes::Impl::draw_visible_depth(const VolumeCamera& camera) {
 
 /// False when no visible surface can lie in the light that comes through the opening: the light misses the picture's
 /// pyramid, or every surface is on the sun's side of the opening.
-bool ShadowVolumes::Impl::light_reaches_picture(const Opening& opening, glm::dvec3 direction_to_sun) const {
+bool ShadowVolumes::Impl::light_reaches_picture(std::span<const glm::vec3> corners, glm::dvec3 direction_to_sun) const {
   const glm::dmat4 rows = glm::transpose(clip_from_world_);
   for (const glm::dvec4& plane : {rows[3] + rows[0], rows[3] - rows[0], rows[3] + rows[1], rows[3] - rows[1]}) {
     const bool is_outside = glm::dot(glm::dvec3(plane), -direction_to_sun) <= 0 &&
-                            std::all_of(opening.vertices.begin(), opening.vertices.end(), [&](std::uint32_t v) {
-                              return glm::dot(plane, glm::dvec4(vertices_[v], 1)) < 0;
-                            });
+                            std::all_of(corners.begin(), corners.end(),
+                                        [&](glm::vec3 corner) { return glm::dot(plane, glm::dvec4(corner, 1)) < 0; });
     if (is_outside) return false;
   }
   const auto height = [&](std::uint32_t v) { return glm::dot(glm::dvec3(vertices_[v]), direction_to_sun); };
   double top = -std::numeric_limits<double>::infinity();
-  for (const std::uint32_t v : opening.vertices) top = std::max(top, height(v));
+  for (const glm::vec3& corner : corners) top = std::max(top, glm::dot(glm::dvec3(corner), direction_to_sun));
   return std::any_of(opaque_triangles_.begin(), opaque_triangles_.end(), [&](const glm::uvec3& t) {
     return std::min({height(t.x), height(t.y), height(t.z)}) < top;
   });
@@ -308,16 +336,13 @@ void ShadowVolumes::Impl::draw(std::size_t first, std::size_t count) const {
                    reinterpret_cast<const void*>(first * sizeof(std::uint32_t)));
 }
 
-BeamMask ShadowVolumes::Impl::render(const VolumeCamera& camera, glm::dvec3 direction_to_sun) {
+// Makes the context ready to count, with the depth of what the camera sees; gives the unit direction to the sun.
+glm::dvec3 ShadowVolumes::Impl::begin(const VolumeCamera& camera, glm::dvec3 direction_to_sun) {
   check_camera(camera);
   if (!is_finite(direction_to_sun) || !(glm::length(direction_to_sun) > 0)) {
     throw InputError("Shadow volumes: the direction to the sun is not a direction");
   }
-  const glm::dvec3 sun = glm::normalize(direction_to_sun);
-  const std::size_t pixel_count = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   pass_count_ = 0;
-
-  const GlContext::Scope scope(context_);
   gl_.BindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
   gl_.Viewport(0, 0, camera.width, camera.height);
   gl_.UseProgram(program_);
@@ -335,6 +360,35 @@ BeamMask ShadowVolumes::Impl::render(const VolumeCamera& camera, glm::dvec3 dire
     draw_visible_depth(camera);
     camera_ = camera;
   }
+  return glm::normalize(direction_to_sun);
+}
+
+void ShadowVolumes::Impl::check_errors() {
+  const GLenum error = gl_.GetError();
+  if (error == GL_NO_ERROR) return;
+  camera_.width = 0;
+  throw GlError("Shadow volumes: OpenGL error " + std::to_string(error) + " on " + context_.name());
+}
+
+std::vector<std::uint8_t> ShadowVolumes::Impl::count(const VolumeCamera& camera, glm::dvec3 direction_to_source,
+                                                     const std::vector<glm::vec3>& vertices,
+                                                     const ShadowCasters& casters) {
+  const GlContext::Scope scope(context_);
+  const glm::dvec3 source = begin(camera, direction_to_source);
+  const VolumeTriangles volume = casters.volume(source, static_cast<std::uint32_t>(vertices.size()));
+  if (volume.empty() || !light_reaches_picture(vertices, source))
+    return std::vector<std::uint8_t>(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height),
+                                     0);
+  upload(other_array_, other_buffer_, vertices, source, GL_STREAM_DRAW);
+  std::vector<std::uint8_t> counted = count_crossings(volume);
+  check_errors();
+  return counted;
+}
+
+BeamMask ShadowVolumes::Impl::render(const VolumeCamera& camera, glm::dvec3 direction_to_sun) {
+  const GlContext::Scope scope(context_);
+  const glm::dvec3 sun = begin(camera, direction_to_sun);
+  const std::size_t pixel_count = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   const glm::vec4 infinity(-sun, 0);
   gl_.BindBuffer(GL_ARRAY_BUFFER, vertex_buffer_);
   gl_.BufferSubData(GL_ARRAY_BUFFER, static_cast<GLintptr>(vertices_.size() * sizeof(glm::vec4)), sizeof(glm::vec4),
@@ -347,13 +401,10 @@ BeamMask ShadowVolumes::Impl::render(const VolumeCamera& camera, glm::dvec3 dire
   BeamMask mask{camera.width, camera.height, count(*opaque_casters_), {}};
   for (std::uint8_t& pixel : mask.shadowed) pixel = pixel != 0;
   for (const Opening& opening : openings_) {
-    mask.crossings.push_back(light_reaches_picture(opening, sun) ? count(opening.casters)
-                                                                 : std::vector<std::uint8_t>(pixel_count, 0));
+    mask.crossings.push_back(light_reaches_picture(opening.corners, sun) ? count(opening.casters)
+                                                                         : std::vector<std::uint8_t>(pixel_count, 0));
   }
-  if (const GLenum error = gl_.GetError(); error != GL_NO_ERROR) {
-    camera_.width = 0;
-    throw GlError("Shadow volumes: OpenGL error " + std::to_string(error) + " on " + context_.name());
-  }
+  check_errors();
   return mask;
 }
 
@@ -366,6 +417,11 @@ ShadowVolumes::~ShadowVolumes() = default;
 
 BeamMask ShadowVolumes::render(const VolumeCamera& camera, glm::dvec3 direction_to_sun) {
   return impl_->render(camera, direction_to_sun);
+}
+
+std::vector<std::uint8_t> ShadowVolumes::count(const VolumeCamera& camera, glm::dvec3 direction_to_source,
+                                               const VolumeCasters& casters) {
+  return impl_->count(camera, direction_to_source, casters.prepared_->vertices, casters.prepared_->casters);
 }
 
 int ShadowVolumes::pass_count() const {

@@ -66,7 +66,8 @@ bool all_below(const Polygon& polygon, const Plane& plane, double margin) {
 }
 
 // Cuts the shadow of a caster, given by its sides, out of the pieces; there only `transmitted` of the light is left.
-void cast_shadow(const std::vector<Plane>& sides, float transmitted, double smallest, std::vector<SunlitPiece>& pieces) {
+void cast_shadow(const std::vector<Plane>& sides, float transmitted, double smallest,
+                 std::vector<SunlitPiece>& pieces) {
   std::vector<SunlitPiece> result;
   for (const SunlitPiece& piece : pieces) {
     const bool misses =
@@ -114,8 +115,7 @@ std::vector<SunlitPiece> sunlit_pieces(const Faces& faces, const std::vector<Mat
     if (front.size() < 3) continue;
     const int opening = materials[static_cast<std::size_t>(other.material)].opening;
     const float transmitted =
-        opening < 0 ? 0.f
-                    : openings[static_cast<std::size_t>(opening)].transmittance_at(static_cast<float>(cosine));
+        opening < 0 ? 0.f : openings[static_cast<std::size_t>(opening)].transmittance_at(static_cast<float>(cosine));
     cast_shadow(sides_along(front, direction_to_sun), transmitted, smallest, pieces);
   }
   return pieces;

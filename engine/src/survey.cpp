@@ -157,14 +157,14 @@ std::vector<int> slots_that_see(const std::vector<char>& is_interior, const std:
     Hit hits[kRaysPerSlot];
     for (std::uint32_t k = 0; k < kRaysPerSlot; ++k) {
       const glm::vec4 u = points.point4(k);
-      const glm::vec2 st = mesh.cell_parameters(slot.face, slot.cell, mesh.sample_local(slot.face, {u.z, u.w}));
-      own[k].origin = leave(mesh.faces(), slot.face, slot.side, st, {u.x, u.y}, own[k].direction);
+      const Node place = mesh.place_on(index, {u.z, u.w});
+      own[k] = {place.position, frame_from_normal(place.normal) * sample_cosine_hemisphere({u.x, u.y})};
     }
     rays.intersect(RayScene::What::kAll, own, hits);
     int seen = 0;
     for (const Hit& hit : hits) {
       if (hit.face < 0) return;  // outdoors
-      seen += is_interior[mesh.element_at(hit) / mesh.elements_per_slot()];
+      seen += is_interior[mesh.slot_at(hit)];
     }
     sees[i] = seen >= kLeastSeen;
   });

@@ -20,6 +20,8 @@ constexpr double kLargestStep = 1.0;  // of a logarithm of a scale
 constexpr int kMaximumGradientSteps = 300;
 constexpr double kGradientTolerance = 1e-3;  // relative: Newton's method needs no more
 
+constexpr std::size_t kRowsAtOnce = 64;
+
 SparseRows transpose(const SparseRows& rows) {
   SparseRows result;
   const std::size_t n = rows.row_count();
@@ -34,35 +36,61 @@ SparseRows transpose(const SparseRows& rows) {
   return result;
 }
 
+// Row i of the mean of both estimates; their difference and sum are added up for the defect.
+void average_row(std::size_t i, const SparseRows& exchange, const SparseRows& reverse, const std::vector<float>& areas,
+                 std::vector<Share>& row, double& difference, double& sum) {
+  const auto own = static_cast<int>(i);
+  std::size_t a = exchange.begin[i], b = reverse.begin[i];
+  bool has_itself = a == exchange.begin[i + 1] && b == reverse.begin[i + 1];  // rows without entries stay empty
+  while (a < exchange.begin[i + 1] || b < reverse.begin[i + 1] || !has_itself) {
+    const int forth_index = a < exchange.begin[i + 1] ? exchange.entries[a].index : INT32_MAX,
+              back_index = b < reverse.begin[i + 1] ? reverse.entries[b].index : INT32_MAX;
+    const int index = std::min({forth_index, back_index, has_itself ? INT32_MAX : own});
+    const float forth = forth_index == index ? exchange.entries[a++].weight : 0;
+    const float back = back_index == index ? reverse.entries[b++].weight : 0;
+    difference += std::abs(static_cast<double>(forth) - back);
+    const float both = areas[i] + areas[index];
+    float mean = areas[index] / both * forth + areas[i] / both * back;  // the same number from either side
+    sum += mean;
+    if (index == own) {
+      mean += kSelfShare * areas[i];
+      has_itself = true;
+    }
+    row.push_back({index, mean});
+  }
+}
+
 // One A_i F_ij for every pair that either patch has seen. With equal numbers of rays a patch, the variance of its
 // estimate is in proportion to its area: the smaller patch, whose rays are denser, has the larger say.
 SparseRows average_both_ways(const SparseRows& exchange, const std::vector<float>& areas, double& defect) {
   const SparseRows reverse = transpose(exchange);
+  const std::size_t n = exchange.row_count(), chunk_count = (n + kRowsAtOnce - 1) / kRowsAtOnce;
+  struct Chunk {
+    std::vector<Share> entries;
+    std::vector<std::size_t> ends;
+    double difference = 0, sum = 0;
+  };
+  std::vector<Chunk> chunks(chunk_count);
+  parallel_indices(chunk_count, 1, [&](std::size_t c) {
+    Chunk& chunk = chunks[c];
+    for (std::size_t i = c * kRowsAtOnce; i < std::min(n, (c + 1) * kRowsAtOnce); ++i) {
+      average_row(i, exchange, reverse, areas, chunk.entries, chunk.difference, chunk.sum);
+      chunk.ends.push_back(chunk.entries.size());
+    }
+  });
   SparseRows result;
-  result.entries.reserve(2 * exchange.entries.size());
   double difference = 0, sum = 0;
-  std::vector<Share> row;
-  for (std::size_t i = 0; i < exchange.row_count(); ++i) {
-    row.clear();
-    std::size_t a = exchange.begin[i], b = reverse.begin[i];
-    while (a < exchange.begin[i + 1] || b < reverse.begin[i + 1]) {
-      const bool has_a = a < exchange.begin[i + 1], has_b = b < reverse.begin[i + 1];
-      const int index =
-          std::min(has_a ? exchange.entries[a].index : INT32_MAX, has_b ? reverse.entries[b].index : INT32_MAX);
-      const float forth = has_a && exchange.entries[a].index == index ? exchange.entries[a++].weight : 0;
-      const float back = has_b && reverse.entries[b].index == index ? reverse.entries[b++].weight : 0;
-      difference += std::abs(static_cast<double>(forth) - back);
-      const float own_say = areas[index] / (areas[i] + areas[index]);
-      const float mean = own_say * forth + (1 - own_say) * back;
-      sum += mean;
-      row.push_back({index, mean});
-    }
-    if (!row.empty()) {
-      row.push_back({static_cast<int>(i), kSelfShare * areas[i]});
-      merge_shares(row);
-    }
-    result.append(row);
+  for (const Chunk& chunk : chunks) {
+    const std::size_t base = result.begin.back();
+    for (const std::size_t end : chunk.ends) result.begin.push_back(base + end);
+    difference += chunk.difference;
+    sum += chunk.sum;
   }
+  result.entries.resize(result.begin.back());
+  parallel_indices(chunk_count, 1, [&](std::size_t c) {
+    std::copy(chunks[c].entries.begin(), chunks[c].entries.end(),
+              result.entries.begin() + static_cast<std::ptrdiff_t>(result.begin[c * kRowsAtOnce]));
+  });
   defect = sum > 0 ? difference / sum : 0;
   return result;
 }
@@ -101,16 +129,36 @@ void solve_positive_definite(const Operator& apply, const std::vector<double>& d
   }
 }
 
+// F_ij = d_i S_ij d_j / A_i. Returns the largest |A_i F_ij - A_j F_ji| / max(A_i, A_j): S is symmetric and each product
+// is taken in the same order both ways, so that only the rounding of F itself is left.
+double scale_both_ways(SparseRows& exchange, const std::vector<double>& scale, const std::vector<float>& areas) {
+  const std::size_t n = exchange.row_count();
+  std::vector<double> worst(n, 0.0);
+  parallel_indices(n, kGrain, [&](std::size_t i) {
+    for (std::size_t k = exchange.begin[i]; k < exchange.begin[i + 1]; ++k) {
+      Share& entry = exchange.entries[k];
+      const double shared = entry.weight * (scale[i] * scale[entry.index]);
+      const auto forth = static_cast<float>(shared / areas[i]), back = static_cast<float>(shared / areas[entry.index]);
+      worst[i] = std::max(
+          worst[i], std::abs(static_cast<double>(areas[i]) * forth - static_cast<double>(areas[entry.index]) * back) /
+                        std::max(areas[i], areas[entry.index]));
+      entry.weight = forth;
+    }
+  });
+  return n > 0 ? *std::max_element(worst.begin(), worst.end()) : 0;
+}
+
 }  // namespace
 
 TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<float>& areas,
                                 const std::vector<float>& row_sums) {
   TransferDefects defects;
   const std::size_t n = form_factors.row_count();
-  for (std::size_t i = 0; i < n; ++i)
+  parallel_indices(n, kGrain, [&](std::size_t i) {
     for (std::size_t k = form_factors.begin[i]; k < form_factors.begin[i + 1]; ++k)
       form_factors.entries[k].weight *= areas[i];
-  const SparseRows exchange = average_both_ways(form_factors, areas, defects.raw_reciprocity);
+  });
+  SparseRows exchange = average_both_ways(form_factors, areas, defects.raw_reciprocity);
 
   std::vector<double> scale(n, 1.0), sum(n, 0.0), residual(n), step(n);
   // Row i of diag(scale) S diag(scale), times x.
@@ -153,20 +201,8 @@ TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<floa
     defects.row_sum = worst_row_sum();
   }
 
-  form_factors = exchange;
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t k = form_factors.begin[i]; k < form_factors.begin[i + 1]; ++k) {
-      Share& entry = form_factors.entries[k];
-      entry.weight = static_cast<float>(entry.weight * scale[i] * scale[entry.index] / areas[i]);
-    }
-  const SparseRows reverse = transpose(form_factors);
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t k = form_factors.begin[i]; k < form_factors.begin[i + 1]; ++k) {
-      const int j = form_factors.entries[k].index;
-      const double forth = static_cast<double>(areas[i]) * form_factors.entries[k].weight;
-      const double back = static_cast<double>(areas[j]) * reverse.entries[k].weight;
-      defects.reciprocity = std::max(defects.reciprocity, std::abs(forth - back) / std::max(areas[i], areas[j]));
-    }
+  defects.reciprocity = scale_both_ways(exchange, scale, areas);
+  form_factors = std::move(exchange);
   return defects;
 }
 

@@ -14,6 +14,7 @@ namespace {
 
 constexpr float kStep = 1e-6f;   // of the largest extent: past a hit that is not to be met again
 constexpr double kClose = 1e-5;  // of the largest extent: a surface seen from the wrong side here is the one just left
+constexpr std::size_t kFewBlocks = 8;
 constexpr std::size_t kGrain = 16;
 constexpr int kEvenDecisions = 4;  // of a path, as in sections
 
@@ -266,10 +267,14 @@ ProductLight UnitCellTracer::trace(glm::dvec3 direction, TraceOptions options) c
   const Run run(*this, options);
   const std::size_t count = static_cast<std::size_t>(options.ray_count), blocks = (count + kGrain - 1) / kGrain;
   std::vector<ExitSorter> sorters(blocks, ExitSorter(direction.z > 0));
-  parallel_indices(blocks, 1, [&](std::size_t block) {
+  const auto follow = [&](std::size_t block) {
     for (std::size_t k = block * kGrain; k < std::min(count, (block + 1) * kGrain); ++k)
       run.ray(static_cast<std::uint32_t>(k), direction, sorters[block]);
-  });
+  };
+  if (blocks > kFewBlocks)
+    parallel_indices(blocks, 1, follow);
+  else  // not worth waking other threads
+    for (std::size_t block = 0; block < blocks; ++block) follow(block);
   ExitSorter all(direction.z > 0);
   for (const ExitSorter& sorter : sorters) all.append(sorter);
   return all.light();

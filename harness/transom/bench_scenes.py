@@ -75,6 +75,15 @@ def _is_changeable(opening: Opening) -> bool:
     return opening.product is not None and not is_file(opening.product.name)
 
 
+def with_other_paint(scene: Scene, share: float) -> Scene:
+    """The scene with the reflectance of its first opaque material multiplied by `share` (up to 1)."""
+    index = next(index for index, material in enumerate(scene.materials) if material.opening < 0)
+    red, green, blue = scene.materials[index].reflectance
+    materials = list(scene.materials)
+    materials[index] = replace(materials[index], reflectance=(share * red, share * green, share * blue))
+    return replace(scene, materials=tuple(materials))
+
+
 def _is_opening(scene: Scene) -> NDArray[np.bool_]:
     is_opening = np.array([material.opening >= 0 for material in scene.materials])
     return np.asarray(is_opening[scene.mesh.face_material])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -15,13 +14,10 @@ from numpy.typing import NDArray
 from transom import _engine
 from transom.daylight.condition import Condition
 from transom.daylight.sky_bins import SkyBins
+from transom.engine_scene import engine_geometry, fenestration_of, what_else_changed
 from transom.errors import InputError
 from transom.fenestration.light import panel_light
-from transom.fenestration.load import load_fenestration
 from transom.fenestration.panels import panel_groups
-from transom.fenestration.through import Fenestration
-from transom.glass import diffuse_reflectance, transmittance_table
-from transom.scene import content_key
 from transom.scene.model import Scene, View
 
 Float32 = NDArray[np.float32]
@@ -66,11 +62,16 @@ class SolveOptions:
 
 @dataclass(frozen=True)
 class Frame:
-    """A picture (height, width, 3), linear RGB whose Y is cd/m², and its parts, which add up to it."""
+    """A picture (height, width, 3), linear RGB whose Y is cd/m², and its parts, which add up to it.
+
+    pass_count: passes of the stencil volumes; 0 by rays. 1 + 2 for each beam and plane of openings, less those that
+    carry nothing.
+    """
 
     radiance: Float32
     components: Mapping[str, Float32]
     edge_pixel_count: int
+    pass_count: int = 0
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ class Engine:
         options = options or SolveOptions()
         sky_bins = SkyBins(SKY_SUBDIVISION)
         try:
-            core = _engine.Engine(_geometry(scene), _core_bins(sky_bins), _core_options(options, trace))
+            core = _engine.Engine(engine_geometry(scene), _core_bins(sky_bins), _core_options(options, trace))
         except _engine.EngineInputError as error:
             raise InputError(_with_object_names(str(error), scene), file=scene.file) from None
         engine = cls(scene, options, sky_bins, core)
@@ -122,7 +123,7 @@ class Engine:
         new one has no light yet. Raises InputError for a room that is not closed.
         """
         try:
-            core = _engine.Engine(self._core, _geometry(scene))
+            core = _engine.Engine(self._core, engine_geometry(scene))
         except _engine.EngineInputError as error:
             raise InputError(_with_object_names(str(error), scene), file=scene.file) from None
         engine = type(self)(scene, self.options, self.sky_bins, core)
@@ -145,7 +146,7 @@ class Engine:
         Raises InputError for a scene of which more has changed, such as clear glass for a product, or the bins of the
         product's directions; the engine then keeps the products that it had.
         """
-        changed = _what_else_changed(self.scene, scene)
+        changed = what_else_changed(self.scene, scene)
         if changed:
             raise InputError(
                 f"differs in its {changed}", file=scene.file, field="products", remedy="Solve the scene anew"
@@ -156,7 +157,7 @@ class Engine:
 
     def _set_products(self) -> None:
         for index, group in enumerate(panel_groups(self.scene)):
-            fenestration = _fenestration(self.scene, group.opening)
+            fenestration = fenestration_of(self.scene, group.opening)
             self._core.set_product(
                 len(self.scene.openings) + index,
                 np.ascontiguousarray(fenestration.transmission(), dtype=np.float32),
@@ -223,7 +224,9 @@ class Engine:
         except _engine.EngineInputError as error:
             raise InputError(str(error), file=self.scene.file, field=f"views.{view.name}") from None
         names = ("sun", "sky", "indirect", "emitted", "exterior") if components else ()
-        return Frame(result["radiance"], {name: result[name] for name in names}, result["edge_pixel_count"])
+        return Frame(
+            result["radiance"], {name: result[name] for name in names}, result["edge_pixel_count"], result["pass_count"]
+        )
 
     def illuminance(
         self, points: Float64, normals: Float64, *, rays: int = 16384, opening_rays: int = 8192
@@ -277,6 +280,11 @@ class Engine:
             },
         }
 
+    def plan(self) -> dict[str, int]:
+        """What the present light took: channels (1 where scene and light are grey), beams that reach anything, opening
+        faces that face them, patches that their light might reach; 0 beams under an overcast sky."""
+        return {name: int(count) for name, count in self._core.plan.items()}
+
     def form_factors(self) -> tuple[NDArray[np.int64], NDArray[np.int32], Float32, Float32]:
         """Form factors between patches as compressed sparse rows: begin, column, value; and patch areas [m²]."""
         begin, column, value = self._core.form_factors
@@ -285,6 +293,13 @@ class Engine:
     def trace(self) -> list[tuple[str, float, float]]:
         """Phases recorded so far as (name, begin, end) [s]; empty unless solved with trace=True."""
         return list(self._core.trace)
+
+    @property
+    def lobe_count(self) -> int:
+        """Lobes of products in the present condition, over all panel groups that the sun shines on."""
+        if self.condition is None:
+            return 0
+        return sum(len(light.beams) for light in panel_light(self.scene, self.condition))
 
     @property
     def sweeps(self) -> int:
@@ -343,7 +358,7 @@ class Relighting:
 
 def trace_primary(scene: Scene, view: View) -> tuple[NDArray[np.int32], Float32, NDArray[np.bool_]]:
     """What pixel centres see first: face (h, w), -1 for none; point (h, w, 3) [m]; whether it is an opaque surface."""
-    face, position = _engine.trace_primary(_geometry(scene), _core_view(view))
+    face, position = _engine.trace_primary(engine_geometry(scene), _core_view(view))
     is_opaque_face = np.array([scene.materials[m].opening < 0 for m in scene.mesh.face_material])
     interior = (face >= 0) & is_opaque_face[np.maximum(face, 0)]
     return face, position.astype(np.float32), interior
@@ -379,58 +394,6 @@ def build_description() -> str:
 def _triple(vector: Float64) -> tuple[float, float, float]:
     x, y, z = (float(v) for v in vector)
     return x, y, z
-
-
-def _geometry(scene: Scene) -> _engine.SceneGeometry:
-    mesh = scene.mesh
-    normals = np.zeros((0, 3)) if mesh.corner_normals is None else mesh.corner_normals.reshape(-1, 3)
-    groups = panel_groups(scene)
-    face_material = np.array(mesh.face_material, dtype=np.int32)
-    for index, group in enumerate(groups):
-        face_material[group.faces] = len(scene.materials) + index
-    geometry = _engine.SceneGeometry(
-        np.ascontiguousarray(mesh.vertices, dtype=np.float64),
-        np.ascontiguousarray(mesh.faces, dtype=np.int32),
-        face_material,
-        np.ascontiguousarray(normals, dtype=np.float32),
-    )
-    for material in scene.materials:
-        geometry.add_material(material.reflectance, material.luminance, material.smooth, material.opening)
-    for opening in scene.openings:
-        geometry.add_opening(transmittance_table(opening), 0.0 if opening.product else diffuse_reflectance(opening))
-    for index, group in enumerate(groups):  # one orientation each, after the openings of the scene
-        geometry.add_material((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, len(scene.openings) + index)
-        basis = _fenestration(scene, group.opening).basis
-        geometry.add_panels(
-            np.ascontiguousarray(group.axes, dtype=np.float32),
-            np.radians(basis.edges_deg).astype(np.float32),
-            np.asarray(basis.counts, dtype=np.int32),
-        )
-    for source in scene.point_sources:
-        geometry.add_point_source(source.position, source.intensity)
-    return geometry
-
-
-def _fenestration(scene: Scene, opening: int) -> Fenestration:
-    product = scene.openings[opening].product
-    assert product is not None
-    return load_fenestration(product)
-
-
-def _what_else_changed(old: Scene, new: Scene) -> str | None:
-    """What differs beside the parameters and names of products; None: nothing."""
-    if [o.product is None for o in old.openings] != [o.product is None for o in new.openings]:
-        return "openings that hold a product"
-    same = tuple(
-        dataclasses.replace(o, product=n.product, visible_transmittance=n.visible_transmittance) if o.product else o
-        for o, n in zip(old.openings, new.openings, strict=True)
-    )
-    if content_key(dataclasses.replace(old, openings=same)) != content_key(new):
-        return "geometry or materials"
-    for opening, (before, after) in enumerate(zip(old.openings, new.openings, strict=True)):
-        if before.product and _fenestration(old, opening).basis != _fenestration(new, opening).basis:
-            return f"bins of the product in {after.name}"
-    return None
 
 
 def _core_bins(bins: SkyBins) -> _engine.SkyBins:

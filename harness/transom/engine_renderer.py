@@ -46,6 +46,7 @@ class EngineRenderer:
         frame = engine.render(view, options["visibility"], edge_samples=options["edge_samples"])
         facts["seconds"]["frame"] = time.perf_counter() - begin
         facts["edge_pixels"] = frame.edge_pixel_count
+        facts["passes"] = frame.pass_count
         report(3, 3)
         return ImageResult(frame.radiance, components=frame.components, facts=facts)
 
@@ -90,7 +91,9 @@ class EngineRenderer:
         report(2, 3)
         facts: dict[str, Any] = {
             **engine.facts(),
-            "beams": 0 if condition.sun_direction is None else 1,
+            "plan": engine.plan(),
+            "beams": (condition.sun_direction is not None) + engine.lobe_count,
+            "lobes": engine.lobe_count,
             "sweeps": engine.sweeps,
             "energy_imbalance": engine.audit().imbalance,
             "seconds": {"solve": solve_s, "relight": relight_s},

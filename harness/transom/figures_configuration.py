@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import calendar
 import io
+import textwrap
 from collections.abc import Mapping
 
-from transom.configuration import DAY, READING_LX, Axis, Plot
+from transom.configuration import DAY, HOUR, READING_LX, Axis, Plot
 from transom.report.numbers import fixed, words
 
 LEVELS_LX = (0.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 100_000.0)
@@ -25,6 +26,9 @@ COLOURS = (
 
 DARK_FROM = (0, 1, 5, 8)
 """Colours on which print is white."""
+
+TITLE_LETTERS = 62
+"""In a line above each panel."""
 
 MOST_PRINTED = 12
 """Cells along an axis up to which each says its number."""
@@ -62,7 +66,7 @@ def configuration_png(plot: Plot, notes: Mapping[str, str] | None = None) -> byt
         bar = figure.colorbar(shown, ax=list(panels), ticks=LEVELS_LX[1:-1], shrink=0.9)
         bar.ax.set_yticklabels([fixed(value, 0) for value in LEVELS_LX[1:-1]])
         bar.set_label(f"illuminance [lx]; green: {low} to {high} lx, to read by")
-        figure.suptitle(f"{plot.scene}: {autonomy_words(plot)}", fontsize=10)
+        figure.suptitle("\n".join(_lines(plot, count)), fontsize=9)
         stream = io.BytesIO()
         figure.savefig(stream, format="png", dpi=150, metadata={"Software": None, **(notes or {})})
     return stream.getvalue()
@@ -78,7 +82,18 @@ def autonomy_words(plot: Plot) -> str:
 
 
 def axis_words(axis: Axis) -> str:
-    return {"hour": "hour [civil standard time]", DAY: "day of the year"}.get(axis.name, words(axis.name).lower())
+    if axis.name == DAY:
+        return "day of the year"
+    if axis.name == HOUR:
+        return "hour [civil standard time]"
+    unit = " [°]" if axis.name.startswith("angle") else ""
+    return words(axis.name).lower() + unit
+
+
+def _lines(plot: Plot, panels: int) -> list[str]:
+    """The title in lines that fit above so many panels."""
+    letters = TITLE_LETTERS * panels
+    return textwrap.wrap(plot.scene, letters) + textwrap.wrap(autonomy_words(plot), letters)
 
 
 def _labels(axis: Axis) -> list[str]:

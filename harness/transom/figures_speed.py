@@ -9,6 +9,7 @@ import matplotlib as mpl
 import numpy as np
 
 from transom.bench import Bench, Measurement
+from transom.bench_growth import SWEEPS, Growth
 from transom.speed_error import SpeedError
 
 STYLES: dict[str, tuple[str, str]] = {
@@ -70,6 +71,43 @@ def scaling_figure(bench: Bench, file_format: Literal["svg", "png"] = "svg") -> 
         right.set_xlabel("share of the phases' time [%]")
         for axes in (left, right):
             _plain(axes)
+        return _saved(figure, file_format)
+
+
+GROWTH: tuple[tuple[str, str, str, str], ...] = (
+    ("load_s", "load", "#999999", "v"),
+    ("solve_s", "solve", "#0072b2", "o"),
+    ("relight_s", "relight, a new hour", "#d55e00", "s"),
+    ("frame_s", "frame, shadow rays", "#009e73", "^"),
+)
+
+
+def growth_figure(found: Growth, file_format: Literal["svg", "png"] = "svg") -> bytes:
+    """Time [s], above, and peak memory [MiB], below, over patches, openings and triangles of the growing hall. The
+    dotted line grows in proportion."""
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(_SETTINGS):
+        figure = Figure(figsize=(9.6, 5.4), layout="constrained")
+        panels = figure.subplots(2, 3, sharex="col", sharey="row", height_ratios=(2, 1))
+        for column, axis in enumerate(SWEEPS):
+            rows = [row for row in found.rows if row.axis == axis]
+            size = np.array([getattr(row, axis) for row in rows], dtype=float)
+            times, memory = panels[0, column], panels[1, column]
+            for field, label, colour, marker in GROWTH:
+                seconds = [getattr(row, field) for row in rows]
+                times.plot(size, seconds, color=colour, marker=marker, linewidth=1.0, label=label)
+            megabytes = np.array([row.peak_memory_mib for row in rows])
+            memory.plot(size, megabytes, color="#0072b2", marker="o", linewidth=1.0)
+            times.plot(size, rows[0].solve_s * size / size[0], ":", color="#999999", linewidth=0.8)
+            memory.set_xlabel(axis)
+            for axes in (times, memory):
+                axes.set_xscale("log")
+                axes.set_yscale("log")
+                _plain(axes)
+        panels[0, 0].set_ylabel("time [s]")
+        panels[1, 0].set_ylabel("peak memory [MiB]")
+        panels[0, 0].legend(frameon=False)
         return _saved(figure, file_format)
 
 

@@ -80,9 +80,7 @@ TEST(Edit, LuminanceOfALampIsThatOfAFreshSolve) {
 }
 
 TEST(Edit, GlazingIsThatOfAFreshSolveAndKeepsWhatIsSeenIndoors) {
-  const SolveFacts facts = expect_fresh([](SceneGeometry& scene) {
-    scene.openings[0] = {{0.f, 0.3f, 0.5f}, 0.2f};
-  });
+  const SolveFacts facts = expect_fresh([](SceneGeometry& scene) { scene.openings[0] = {{0.f, 0.3f, 0.5f}, 0.2f}; });
   EXPECT_EQ(facts.kept_patch_rows, facts.patch_count);
   EXPECT_EQ(facts.kept_node_rows, facts.node_count);
 }
@@ -110,9 +108,7 @@ TEST(Edit, TheEngineThatIsEditedKeepsItsLight) {
   const Engine before(scene, tregenza(), options());
   const auto light = before.relight(uniform_sky(5000));
   scene.materials[0].reflectance = glm::vec3(0.1f);
-  {
-    const Engine edited(before, scene);
-  }
+  { const Engine edited(before, scene); }
   EXPECT_EQ(before.relight(uniform_sky(5000))->node_indirect, light->node_indirect);
 }
 

@@ -50,7 +50,7 @@ TEST(Interreflection, TwoLevelsFindWhatSweepsFind) {
   const Interreflection prepared(chain.form_factors, chain.through, chain.reflectance, chain.areas, chain.places);
   EXPECT_LT(prepared.cluster_count(), 600);
   std::vector<glm::vec3> e;
-  prepared.solve(chain.emitted, chain.direct, 1e-7, 1000, e);
+  prepared.solve({chain.emitted, chain.direct}, 1e-7, 1000, e);
   const std::vector<glm::vec3> expected = swept(chain, 400);
   for (std::size_t i = 0; i < e.size(); ++i)
     for (int channel = 0; channel < 3; ++channel)
@@ -62,9 +62,8 @@ TEST(Interreflection, ConvergesWhereOneColourIsAlmostLossless) {
   for (glm::vec3& rho : chain.reflectance) rho = {0.99f, 0.98f, 0.6f};
   const Interreflection prepared(chain.form_factors, chain.through, chain.reflectance, chain.areas, chain.places);
   std::vector<glm::vec3> e;
-  EXPECT_LT(prepared.solve(std::vector<glm::vec3>(400, glm::vec3(1)), std::vector<glm::vec3>(400, glm::vec3(0)), 1e-6,
-                           20000, e),
-            2000);
+  const std::vector<glm::vec3> emitted(400, glm::vec3(1)), direct(400, glm::vec3(0));
+  EXPECT_LT(prepared.solve({emitted, direct}, 1e-6, 20000, e), 2000);
   EXPECT_NEAR(e[7].x, 1 / (1 - 0.99), 0.1);
   EXPECT_NEAR(e[7].z, 1 / (1 - 0.6), 0.01);
 }
@@ -79,7 +78,8 @@ TEST(Interreflection, ReflectanceActsBeforeTheOperatorAndNotAfter) {
   const Interreflection prepared(f, none, {glm::vec3(0.2f), glm::vec3(0.8f)}, {1, 1},
                                  {{{0, 0, 0}, {0, 0, 1}}, {{0, 0, 1}, {0, 0, -1}}});
   std::vector<glm::vec3> e;
-  prepared.solve({glm::vec3(100), glm::vec3(0)}, {glm::vec3(0), glm::vec3(0)}, 1e-7, 100, e);
+  const std::vector<glm::vec3> emitted{glm::vec3(100), glm::vec3(0)}, direct(2, glm::vec3(0));
+  prepared.solve({emitted, direct}, 1e-7, 100, e);
   const double b1 = 100 / (1 - 0.2 * 0.8);
   EXPECT_NEAR(e[1].x, b1, 1e-3);
   EXPECT_NEAR(e[0].x, 0.8 * b1, 1e-3);
@@ -94,9 +94,8 @@ TEST(Interreflection, ARoomThatLosesNothingIsRefused) {
   const Interreflection prepared(f, none, std::vector<glm::vec3>(2, glm::vec3(1)), {1, 1},
                                  {{{0, 0, 0}, {0, 0, 1}}, {{0, 0, 1}, {0, 0, -1}}});
   std::vector<glm::vec3> e;
-  EXPECT_THROW(
-      prepared.solve(std::vector<glm::vec3>(2, glm::vec3(1)), std::vector<glm::vec3>(2, glm::vec3(0)), 1e-9, 50, e),
-      std::runtime_error);
+  const std::vector<glm::vec3> emitted(2, glm::vec3(1)), direct(2, glm::vec3(0));
+  EXPECT_THROW(prepared.solve({emitted, direct}, 1e-9, 50, e), std::runtime_error);
 }
 
 }  // namespace

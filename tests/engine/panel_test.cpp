@@ -1,9 +1,9 @@
 // Panels of glazing products against closed forms, clear glass and another visibility method.
 #include <gtest/gtest.h>
 
+#include <oneapi/tbb/global_control.h>
 #include <cmath>
 #include <numbers>
-#include <oneapi/tbb/global_control.h>
 
 #include "rooms.h"
 #include "transom/angle_bins.h"
@@ -21,9 +21,9 @@ using test::add_quad;
 using test::diffuse;
 
 constexpr float kPi = std::numbers::pi_v<float>;
-constexpr double kWidth = 4, kDepth = 6, kHeight = 3;                    // of the room, x, y, z
-constexpr double kLeft = 1, kRight = 3, kSill = 1, kHead = 2;            // of the panel, in the wall y = 0
-const glm::vec3 kSun = glm::normalize(glm::vec3(0.3f, -1.f, 0.8f));     // towards it
+constexpr double kWidth = 4, kDepth = 6, kHeight = 3;                // of the room, x, y, z
+constexpr double kLeft = 1, kRight = 3, kSill = 1, kHead = 2;        // of the panel, in the wall y = 0
+const glm::vec3 kSun = glm::normalize(glm::vec3(0.3f, -1.f, 0.8f));  // towards it
 const glm::vec3 kInto(0, 1, 0);
 
 AngleBins klems() {
@@ -278,6 +278,32 @@ TEST(Panel, GroundBelowTheFalseSunCastsNoShadow) {
   EXPECT_NEAR(e[0].direct.y, 1000 * 0.6f / std::sqrt(1.36f), 0.5f);
 }
 
+TEST(Panel, RightIsRightAndUpIsUpAsSeenFromTheRoom) {
+  const Engine engine(south_room(0.f), test::tregenza(), quick_options());
+  const AngleBins bins = klems();
+  const float theta = 60 * kPi / 180;
+  const auto light_into = [&](glm::vec3 direction) {
+    Condition condition = dark();
+    condition.residuals.push_back({0, kSun, std::vector<glm::vec3>(145, glm::vec3(0))});
+    condition.residuals[0].radiance[static_cast<std::size_t>(bins.bin_of(direction))] = glm::vec3(1000);
+    const auto e = test::illuminance(engine, *engine.relight(condition),
+                                     {{0, 1, 1.5}, {kWidth, 1, 1.5}, {2, 1, kHeight}, {2, 1, 0}},
+                                     {{1, 0, 0}, {-1, 0, 0}, {0, 0, -1}, {0, 0, 1}}, {64, 4096});
+    return std::vector<float>{e[0].sky.y, e[1].sky.y, e[2].sky.y, e[3].sky.y};
+  };
+  const float s = std::sin(theta), c = std::cos(theta);
+  const std::vector<glm::vec3> ways{{s, 0, c}, {-s, 0, c}, {0, s, c}, {0, -s, c}};  // right, left, up, down
+  for (std::size_t way = 0; way < ways.size(); ++way) {
+    const std::vector<float> walls = light_into(ways[way]);  // west, east, ceiling, floor
+    for (std::size_t wall = 0; wall < walls.size(); ++wall) {
+      if (wall == way)
+        EXPECT_GT(walls[wall], 1) << way;
+      else
+        EXPECT_LT(walls[wall], 0.2f * walls[way]) << way << " " << wall;
+    }
+  }
+}
+
 TEST(Panel, NothingPassesBeforeAProductIsSetNorFromTheRoomSide) {
   const Engine engine(south_room(0.5f), test::tregenza(), quick_options());
   Condition condition = test::uniform_sky(5000, 1000);
@@ -330,6 +356,33 @@ TEST(Panel, LightDoesNotDependOnThreads) {
     return engine.relight(condition)->patch_irradiance;
   };
   EXPECT_EQ(light(1), light(2));
+}
+
+TEST(Panel, RaysAndStencilVolumesShowTheSameLobes) {
+  SceneGeometry scene = south_room(0.5f);
+  add_quad(scene, {-20, -20, -0.01}, {20, -20, -0.01}, {20, 20, -0.01}, {-20, 20, -0.01}, 0);
+  add_quad(scene, {-9, -0.3, kHead}, {9, -0.3, kHead}, {9, 0, kHead}, {-9, 0, kHead}, 0);  // an overhang
+  add_box(scene, {1.8, 1.5, 0}, {2.2, 1.9, 2.2}, 0);                                       // a pillar in the light
+  const Engine engine(scene, test::tregenza(), quick_options());
+  Condition condition = dark();
+  for (const glm::vec3 direction : {glm::vec3(0, 1, 0.6f), glm::vec3(0.3f, 1, -0.5f), glm::vec3(0, -1, 0.6f)})
+    condition.beams.push_back(lobe(direction));
+  const auto lighting = engine.relight(condition);
+  FrameRenderer renderer(engine);
+  const View view{{0.4, 5.6, 1.2}, {2.2, 1, 1.6}, {0, 0, 1}, 1.4, 160, 120};
+  FrameOptions options;
+  options.edge_samples = 1;
+  const Frame rays = renderer.render(view, *lighting, options);
+  options.visibility = Visibility::kVolumes;
+  const Frame volumes = renderer.render(view, *lighting, options);
+  EXPECT_EQ(volumes.pass_count, 1 + 2 * 2);  // of the lobe that turns away: none
+  int lit = 0, different = 0;
+  for (std::size_t p = 0; p < rays.sun.size(); ++p) {
+    lit += rays.sun[p].y > 0;
+    different += std::abs(rays.sun[p].y - volumes.sun[p].y) > 1e-3f * rays.sun[p].y;
+  }
+  EXPECT_GT(lit, 800);
+  EXPECT_LE(different, 20);  // on edges
 }
 
 TEST(Panel, WrongProductsAreRefused) {

@@ -1,6 +1,7 @@
 #include "transom/section.h"
 
 #include <gtest/gtest.h>
+#include <oneapi/tbb/global_control.h>
 
 #include <cmath>
 #include <numbers>
@@ -296,6 +297,45 @@ TEST(Section, ArcRefractsAsManyStraightLines) {
     for (const Exit& exit : b.transmitted) mean_b += exit.flux * exit.direction.y;
     EXPECT_NEAR(mean_a, mean_b, 1.0 / 400) << theta;
   }
+}
+
+TEST(Section, ThreadsDoNotChangeTheAnswer) {
+  Section section = prisms(0);  // with a diffuse, curved sheet behind: rays of every kind
+  section.high_z = 0.006;
+  section.lines.push_back({{0, 0.004}, {0.0007, 0.0045}, {SurfaceKind::kDiffuse, 0, 0, 0.5, 0.4, 0.3, 0.1}, 0.0001});
+  std::vector<ProductLight> lights;
+  for (const std::size_t threads : {1u, 2u}) {
+    const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, threads);
+    lights.push_back(trace_section(section, incident(40, -60), {1024}));
+  }
+  ASSERT_EQ(lights[0].transmitted.size(), lights[1].transmitted.size());
+  for (std::size_t k = 0; k < lights[0].transmitted.size(); ++k) {
+    EXPECT_EQ(lights[0].transmitted[k].flux, lights[1].transmitted[k].flux);
+    EXPECT_EQ(lights[0].transmitted[k].direction, lights[1].transmitted[k].direction);
+  }
+  EXPECT_EQ(lights[0].absorbed, lights[1].absorbed);
+}
+
+TEST(Section, SecondScatteringIsLambertianToo) {
+  // Two diffuse sheets: light that leaves the second has been scattered twice. Its mean cosine is 2/3, and its azimuth
+  // is even: the mean of the cosine of four times the azimuth is 0.
+  Section section;
+  section.period = 0.01;
+  section.low_z = -0.001;
+  section.high_z = 0.003;
+  section.media = {{1, 0}};
+  for (const double z : {0.0, 0.002})
+    section.lines.push_back({{0, z}, {0.01, z}, {SurfaceKind::kDiffuse, 0, 0, 0.3, 0.3, 0.7, 0}});
+  const ProductLight light = trace_section(section, incident(30, 50), {16384});
+  double cosine = 0, fourfold = 0;
+  for (const Exit& exit : light.transmitted) {
+    cosine += exit.flux * exit.direction.z;
+    fourfold += exit.flux * std::cos(4 * std::atan2(exit.direction.y, exit.direction.x));
+  }
+  const double passed = total(light.transmitted);
+  EXPECT_NEAR(passed, 0.7 * 0.7 / (1 - 0.3 * 0.3), 2e-3);
+  EXPECT_NEAR(cosine / passed, 2.0 / 3, 5e-3);
+  EXPECT_NEAR(fourfold / passed, 0, 1e-2);
 }
 
 TEST(Section, RefusesWhatCannotBe) {

@@ -118,8 +118,8 @@ def test_every_quantity_is_measured_with_its_phases(tmp_path: Path) -> None:
     folder = write_scene(tmp_path / "room")
     found = measure_point(str(folder), Point("default", target_patches=200), 0.5)
     rows = {row.quantity: row for row in found.measurements}
-    expected = {"load", "solve", "reglaze", "relight_hour", "relight_sky", "relight_overcast", "frame_rays", "sensors"}
-    assert expected | {"peak_memory"} <= rows.keys()
+    expected = {"load", "solve", "reglaze", "recolour", "relight_hour", "relight_sky", "relight_overcast", "frame_rays"}
+    assert expected | {"sensors", "peak_memory"} <= rows.keys()
     assert {"solve/patches", "solve/nodes"} <= {phase.name for phase in rows["solve"].phases}
     relight = rows["relight_hour"]
     assert {"relight_hour/gather", "relight_hour/interreflection"} <= {phase.name for phase in relight.phases}

@@ -53,7 +53,7 @@ def test_report_is_one_offline_page_with_every_picture_in_it(project: Path) -> N
     page = (project / "report" / "index.html").read_text()
     reader = PageReader()
     reader.feed(page)
-    assert len(reader.sources) == 3 + 2 + 6, "a viewer, a moment, a strip"
+    assert len(reader.sources) == 3 + 2 + 6 + 1, "a viewer, a moment, a strip, the lobes of a product"
     assert all(re.match("data:image/webp;base64,", source) for source in reader.sources)
     assert reader.images_without_alt == 0
     assert all(link.removeprefix("#") in reader.anchors for link in reader.links)

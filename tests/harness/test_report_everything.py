@@ -122,7 +122,7 @@ def checked() -> Checked:
 def content() -> Content:
     made = comparison()
     results = collect_results([(made, judge(made.subjects(), made.missing, TOLERANCES))], [])
-    chapter = Chapter([], [], prism_figure(), [])
+    chapter = Chapter([], [], prism_figure(), [], [])
     pictures = Pictures(rooms=[], hours=[], factoring=[], day=None, figure_13=[], corners=[], fenestration=chapter)
     return make_content(results, [], pictures, speed(), TOLERANCES, read_notes(), [checked()])
 

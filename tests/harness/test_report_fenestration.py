@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +14,13 @@ from report_project import FENESTRATION, make_project, render_references
 
 from transom.daylight.condition import resolve_condition
 from transom.errors import InputError
+from transom.fenestration.evaluation import COUNTS, WIDTHS_DEG, Errors, ProductEvaluation
 from transom.fenestration.reglazing import load_glazed
+from transom.report import rows_fenestration
 from transom.report.build import write_report
 from transom.report.fenestration import profile_angle_deg
-from transom.report.rows_fenestration import Expected, glazing_words, written_table
-from transom.report.table import TABLES_FORMAT, PlainCell, PlainRow, PlainTable, TablesFile
+from transom.report.rows_fenestration import glazing_words
+from transom.report.table import Table
 from transom.scene.model import ConditionSpec
 
 BINARY = find_chromium()
@@ -71,7 +72,7 @@ def test_products_are_beside_the_reference_in_a_gallery_and_not_among_the_rooms(
 def test_what_no_command_has_written_is_said_to_be_absent(report: Path) -> None:
     page = (report / "index.html").read_text()
     absent = page[page.index('class="absent-list"') : page.index("</details>")]
-    assert "Interpolation between directions" in absent and "Speed with products" in absent
+    assert "Interpolation: light moved" in absent and "Speed with products" in absent
 
 
 @pytest.mark.skipif(BINARY is None, reason="no Chromium here: the page is not looked at")
@@ -84,19 +85,40 @@ def test_the_chapter_fits_a_narrow_window(report: Path, tmp_path: Path) -> None:
         assert browser.errors == []
 
 
-def test_a_written_table_comes_back_cell_by_cell(tmp_path: Path) -> None:
-    rows = [PlainRow(group="floor", source="seed 7", cells=[PlainCell(text="prism", value=None)])]
-    plain = PlainTable(name="cfs_energy", title="Energy", head=["Product"], command="make it", rows=rows)
-    file = TablesFile(format=TABLES_FORMAT, created=datetime.now(UTC), tables=[plain])
-    (tmp_path / "cfs_energy.json").write_text(file.model_dump_json())
-    found = written_table(tmp_path, Expected("cfs_energy", "?", "?"))
-    assert (found.title, found.command, found.rows[0].source) == ("Energy", "make it", "seed 7")
-    (tmp_path / "cfs_other.json").write_text(file.model_dump_json())
-    with pytest.raises(InputError, match="no table of that name"):
-        written_table(tmp_path, Expected("cfs_other", "?", "?"))
-    (tmp_path / "cfs_bad.json").write_text("{}")
-    with pytest.raises(InputError, match=r"cfs_bad\.json"):
-        written_table(tmp_path, Expected("cfs_bad", "?", "?"))
+def evaluation(**changes: Any) -> ProductEvaluation:
+    flat = Errors(relative=[[0.01, -0.02], [0.03, 0.0]])
+    shares = [[min(1.0, 0.2 * count + 0.01 * width) for count in COUNTS] for width in WIDTHS_DEG]
+    known: dict[str, Any] = {"product": "prismatic_panel", "represented": shares, "represented_least": shares}
+    known |= {"moved_ours": 0.02, "moved_rank": 0.08, "moved_paper": 0.1, "moved_nearest": 0.12}
+    known |= {"traced": flat, "tabulated": flat, "tracer": flat, "sky": flat, "split_difference": 2e-17}
+    known |= {"transmittance_mean_difference": -3e-5, "transmittance_uncertainty": 5e-5}
+    return ProductEvaluation(**(known | changes))
+
+
+def texts(found: Table) -> list[list[str]]:
+    return [[cell.text for cell in row.cells] for row in found.rows]
+
+
+def test_an_evaluation_of_lobes_becomes_the_tables_of_the_chapter(tmp_path: Path) -> None:
+    file = tmp_path / "evaluation.json"
+    file.write_text(json.dumps([evaluation().model_dump()]))
+    found = rows_fenestration.read_evaluations(file)
+    (row,) = texts(rows_fenestration.representation(found, "made up"))
+    assert row[:2] == ["Prismatic panel", "1.50 / 2.70"]
+    (row,) = texts(rows_fenestration.interpolation(found, "made up"))
+    assert row[1:] == ["2.0", "8.0", "10.0", "12.0", "0.25"]
+    (row,) = texts(rows_fenestration.energy(found, "made up"))
+    assert row[1:] == ["−0.30", "0.50", "2.0e-13"]
+    rows = texts(rows_fenestration.represented(found, "made up"))
+    assert [row[0] for row in rows] == ["2", "4", "8", "15", "23", "30"]
+    assert rows[4][3] == "83.0"
+
+
+def test_no_evaluation_is_no_rows_and_a_malformed_one_is_refused_by_name(tmp_path: Path) -> None:
+    assert rows_fenestration.read_evaluations(tmp_path / "evaluation.json") == []
+    (tmp_path / "evaluation.json").write_text('[{"product": 3}]')
+    with pytest.raises(InputError, match=r"evaluation\.json"):
+        rows_fenestration.read_evaluations(tmp_path / "evaluation.json")
 
 
 def test_glazing_is_told_in_words() -> None:

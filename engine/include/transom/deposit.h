@@ -19,6 +19,12 @@ struct LitElement {
   glm::vec3 illuminance;
 };
 
+/// What beams took: those that some opening or patch outdoors faces, the opening faces that face them, and the patches
+/// that their light might reach, summed over beams.
+struct BeamPlan {
+  int beams = 0, facing_openings = 0, patches = 0;
+};
+
 /// Casts light from beams and point sources on patches and points. Openings on the way take their share.
 ///
 /// Elements look for the sun through openings. An opening that is smaller than an element would be missed by most of
@@ -34,17 +40,18 @@ class DirectLight {
   struct Receivers {
     std::vector<int> slots;
     std::vector<char> is_behind_openings;  ///< beams reach it through openings alone
-    std::vector<std::array<glm::vec3, 4>>
-        corners;                     ///< lifted, at (0, 0), (1, 0), (1, 1), (0, 1); triangles: (0, 1) twice
+    /// Of each patch, lifted: at (0, 0), (1, 0), (1, 1) and (0, 1) of its cell; of a triangle the third is the fourth.
+    std::vector<std::array<glm::vec3, 4>> corners;
     std::vector<glm::vec3> normals;  ///< of the lit side
   };
   /// is_behind_openings: empty where none is known to be.
   Receivers receivers(const std::vector<int>& slots, std::vector<char> is_behind_openings) const;
 
   /// Mean direct illuminance of the elements of the receivers that receive any, in their order. Stratified over each
-  /// element; of a patch that is partly lit, elements at the edge of light are sampled eight times as densely. Patches
-  /// behind openings cost rays only where the outline of an opening falls on them.
-  std::vector<LitElement> deposit(const std::vector<Beam>& beams, const Receivers& receivers, std::uint32_t seed) const;
+  /// element, eight times as densely at edges of light. Patches behind openings cost rays only where the outline of an
+  /// opening falls on them. plan: what it took is added to it; may be null.
+  std::vector<LitElement> deposit(const std::vector<Beam>& beams, const Receivers& receivers, std::uint32_t seed,
+                                  BeamPlan* plan = nullptr) const;
 
   /// Share of a beam that arrives at lifted points: 0 where something opaque intervenes, else the transmittance. Of a
   /// lobe: what the openings before its panel leave, where the panel is the first opening that the point sees.
@@ -64,19 +71,24 @@ class DirectLight {
   using Corners = std::array<glm::vec3, 4>;
   std::vector<glm::vec3> points_on(int slot, const Corners& corners, std::span<const int> elements, int samples,
                                    const Patterns& patterns) const;
-  std::vector<std::size_t> reached(glm::vec3 direction, const Receivers& receivers) const;
+  std::vector<std::size_t> reached(glm::vec3 direction, const Receivers& receivers,
+                                   const std::vector<int>& openings) const;
   std::vector<float> sample_sun(const Beam& sun, const Receivers& receivers, const std::vector<std::size_t>& candidates,
                                 const Patterns& patterns) const;
   std::vector<int> partly_lit(int slot, const std::vector<int>& place_of_slot, const std::vector<float>& share) const;
   void add_sun(const Beam& sun, const Receivers& receivers, const Patterns& patterns,
-               std::vector<std::vector<glm::vec3>>& sum) const;
+               std::vector<std::vector<glm::vec3>>& sum, BeamPlan& plan) const;
   std::vector<std::size_t> reached_by_lobe(const Beam& lobe, const Receivers& receivers) const;
-  void lobe_on_slot(const Beam& lobe, int slot, std::uint32_t seed, std::vector<float>& mean) const;
+  std::vector<std::vector<glm::vec3>> element_outlines(int slot, const Corners& corners) const;
+  void lobe_on_slot(const Beam& lobe, int slot, const Corners& corners, std::uint32_t seed,
+                    std::vector<float>& mean) const;
   void add_lobe(const Beam& lobe, const Receivers& receivers, std::uint32_t seed,
-                std::vector<std::vector<glm::vec3>>& sum) const;
+                std::vector<std::vector<glm::vec3>>& sum, BeamPlan& plan) const;
   void shaft_transmission(const Beam& lobe, std::span<const glm::vec3> points, std::span<float> share) const;
   void sources_on_slot(int slot, const Corners& corners, glm::vec3 normal, const Patterns& patterns,
                        std::vector<glm::vec3>& sum) const;
+  void sources_and_beams_on_cluster(const std::vector<Beam>& beams, int slot, std::uint32_t seed,
+                                    std::vector<glm::vec3>& sum) const;
 
   void ignore_small_openings(glm::vec3 direction, std::span<const glm::vec3> points, std::span<float> share) const;
   std::map<int, glm::vec3> send_through_small_openings(const std::vector<Beam>& beams, std::uint32_t seed) const;

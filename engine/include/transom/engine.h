@@ -152,6 +152,7 @@ class Engine {
   };
 
   void solve(const Engine* solved);
+  FaceClusters clusters() const;
   Known known_from(const Engine* solved) const;
   std::vector<int> first_wave() const;
   PatchRow patch_row(int slot, const Known& known) const;
@@ -176,13 +177,12 @@ class Engine {
                                                   RelightFollower* follower) const;
   Lighting direct_classic(Condition condition, const Lighting* previous) const;
   void show_classic(Lighting& lighting) const;
-  std::vector<Share> to_slots(std::vector<Share> elements) const;
-  std::vector<Share> patches_at(const std::vector<Share>& slots) const;
   Lighting direct_light_of(Condition condition) const;
+  bool is_grey(const Condition& condition) const;
   std::shared_ptr<const Lighting> with_indirect_of(Lighting lighting, const Lighting* previous) const;
   void find_smooth_radiosity(Lighting& lighting) const;
   void gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& first_reflection) const;
-  std::vector<Share> to_patches(const std::vector<Share>& elements) const;
+  std::vector<Share> to_patches(const std::vector<Share>& slots) const;
   glm::vec3 sky_light(const Lighting& lighting, const SparseRows& rows, std::size_t row) const;
   void find_shafts(Condition& condition, std::vector<glm::vec3>& residual) const;
   double find_panel_radiance(const std::vector<glm::vec3>& radiosity, Lighting& lighting) const;
@@ -218,6 +218,7 @@ class Engine {
   std::vector<char> is_interior_;
   DirectLight::Receivers receivers_;  // all patches
   std::vector<int> unseen_slots_;     // that see patches indoors and were seen by none
+  bool is_grey_scene_ = false;        // all reflectances and emitters
   bool connects_emitters_ = false;    // small emitters: found by connection, not by rays
   std::shared_ptr<const SparseRows> form_factors_;
   SparseRows through_, patch_sky_;

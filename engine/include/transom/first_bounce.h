@@ -18,16 +18,17 @@ struct BrightElement {
 
 /// An element as points see it.
 struct ElementShape {
-  glm::vec3 corner[4];  ///< counter-clockwise from the lit side
-  int corner_count;
-  glm::vec3 middle;  ///< lifted
-  float area;        ///< [m²]
+  glm::vec3 corner[4];   ///< counter-clockwise from the lit side
+  int corner_count = 0;  ///< 0: of a cluster of small faces
+  glm::vec3 middle;      ///< lifted
+  glm::vec3 normal;
+  float area = 0;  ///< [m²]
 };
 ElementShape element_shape(const LightMesh& mesh, int element);
 
-/// Form factor from a point to an unoccluded element that faces `element_normal`: a closed form if it is adjacent,
-/// else as if all of it were at its middle.
-float element_share(glm::vec3 point, glm::vec3 normal, const ElementShape& shape, glm::vec3 element_normal);
+/// Form factor from a point to an unoccluded element: a closed form if it is adjacent, else as if all of it were at its
+/// middle.
+float element_share(glm::vec3 point, glm::vec3 normal, const ElementShape& shape);
 
 /// The bright elements of a condition, by patch, ready to be looked at from points.
 class FirstBounce {
@@ -52,6 +53,7 @@ class FirstBounce {
     glm::vec3 flux;  // reflected [lm]
     float weight;    // sum of the weights of the centroid
     float size;      // diameter [m]
+    bool is_cluster;
   };
   struct LitPiece {
     ElementShape shape;

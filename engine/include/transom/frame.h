@@ -4,9 +4,11 @@
 #include <glm/glm.hpp>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "transom/engine.h"
+#include "transom/shadow_volumes.h"
 #include "transom/view.h"
 #include "transom/view_samples.h"
 
@@ -32,6 +34,7 @@ struct Frame {
   std::vector<glm::vec3> emitted;   ///< emitters seen
   std::vector<glm::vec3> exterior;  ///< sky and ground, and emitters seen through openings
   int edge_pixel_count = 0;         ///< pixels that were supersampled
+  int pass_count = 0;               ///< kVolumes: passes of the stencil method
 };
 
 /// What pixel centres look at.
@@ -42,9 +45,6 @@ struct PrimaryHits {
 
 /// Traces a ray through every pixel centre. Needs no solve.
 PrimaryHits trace_primary(const SceneGeometry& scene, const View& view);
-
-class ShadowVolumes;
-class GlContext;
 
 /// Renders what an engine has lit. What the last camera saw is kept: further pictures of it, under any
 /// light, cost beams and sums. Holds the GL context of the stencil method, made on first use; one thread.
@@ -57,11 +57,21 @@ class FrameRenderer {
 
  private:
   class Masks;
+  /// What bounds a block of beam points.
+  struct Box {
+    glm::vec3 low{0}, high{0};
+  };
+  std::vector<Box> boxes_of(const std::vector<BeamPoint>& points) const;
+  void find_shares_by_block(const Beam& beam, const std::vector<BeamPoint>& points, const std::vector<Box>& boxes,
+                            const std::vector<float>* mask_share, const Masks& masks, std::vector<float>& shares) const;
   struct VolumeGroup {
     int opening;
     glm::vec3 normal;
   };
-  void render_masks(const View& view, const std::vector<Beam>& beams, Masks& masks);
+  void make_volumes();
+  int render_mask(const Beam& beam, const View& view, const Masks& masks, std::vector<float>& share);
+  int render_shafts(const Beam& lobe, const VolumeCamera& camera, std::vector<float>& share);
+  const VolumeCasters& casters_behind(glm::vec4 plane);
   void add_smooth_light(const ViewSamples& samples, const Lighting& lighting, bool components, Frame& frame) const;
   void add_beam(const ViewSamples& samples, const Beam& beam, const std::vector<float>* mask_share, const Masks& masks,
                 std::vector<glm::vec3>& picture, std::vector<char>& is_edge) const;
@@ -70,9 +80,11 @@ class FrameRenderer {
 
   const Engine& engine_;
   std::unique_ptr<ViewSamples> samples_;  // of the last camera
+  std::vector<Box> centre_boxes_, fine_boxes_, pane_boxes_;
   std::unique_ptr<GlContext> context_;
   std::unique_ptr<ShadowVolumes> volumes_;
   std::vector<VolumeGroup> volume_groups_;  // openings of one kind and orientation, as the stencil counts them
+  std::vector<std::pair<glm::vec4, VolumeCasters>> behind_planes_;  // what stands on the room side of panels
 };
 
 }  // namespace transom

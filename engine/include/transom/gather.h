@@ -1,4 +1,4 @@
-/// @file Where the light of a point or a patch comes from: shares of elements, sky bins, and openings looked through.
+/// @file Where the light of a point or a patch comes from: shares of slots, sky bins, and openings looked through.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -29,8 +29,8 @@ struct Share {
 
 /// The light of one receiver as weights. Illuminance E = sum reached B + sum through B + sum sky L.
 struct GatherRow {
-  std::vector<Share> reached;   ///< elements seen without looking through an opening: form factors
-  std::vector<Share> through;   ///< elements seen through openings: form factors x transmittance
+  std::vector<Share> reached;  ///< slots seen without looking through an opening: form factors
+  std::vector<Share> through;  ///< slots seen through openings: form factors x transmittance
   /// Sky bins, then the ground, then exit bins of panels (Panels): illuminance per luminance [lx per cd/m²].
   std::vector<Share> sky;
   float escaped = 0;            ///< share of the hemisphere that meets nothing: open sky
@@ -43,8 +43,8 @@ struct GatherRow {
 /// Hemisphere: cosine-distributed rays to the first surface, opening or not. An opening's own reflection is thus part
 /// of `reached`. What is seen through the openings is sampled on the openings: solid-angle sampling of their triangles
 /// [Arvo 1995], each ray continued outdoors to an obstruction, the sky or the ground, times the transmittance of all
-/// openings on its way. A ray that meets another opening first is left to that opening. A ray ends at the room side of a
-/// panel: what it sees there is the panel's exit bin, a light source like a bin of the sky.
+/// openings on its way. A ray that meets another opening first is left to that opening. A ray ends at the room side of
+/// a panel: what it sees there is the panel's exit bin, a light source like a bin of the sky.
 class Gatherer {
  public:
   Gatherer(const LightMesh& mesh, const RayScene& rays, const std::vector<Material>& materials,

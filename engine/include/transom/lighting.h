@@ -22,6 +22,12 @@ struct Irradiance {
   glm::vec3 indirect{0};  ///< all surfaces: reflected and emitted
 };
 
+/// How much of a relighting a condition needed.
+struct RelightPlan {
+  bool is_grey = false;  ///< reflectances and light are grey: one channel was computed, the others repeat it
+  BeamPlan beams;        ///< none for an overcast sky
+};
+
 /// Light of a condition, as Engine::relight found it. Shown, measured and kept as it is; never changed.
 struct Lighting {
   Condition condition;
@@ -38,10 +44,11 @@ struct Lighting {
   std::vector<glm::vec3> patch_sun;                ///< directly from beams and point sources [lx]
   bool is_final = true;                            ///< false: a state on the way, with indirect light to come
   int sweeps = 0;                                  ///< cycles of interreflection
-  int shots = 0;                                   ///< kClassic: patches that have shot
-  double unshot_share = 0;                         ///< kClassic: flux in flight, relative
-  ShootingState shooting;                          ///< kClassic: where the next relighting may begin
-  int forward_ray_count = 0;                       ///< kClassic
+  RelightPlan plan;
+  int shots = 0;              ///< kClassic: patches that have shot
+  double unshot_share = 0;    ///< kClassic: flux in flight, relative
+  ShootingState shooting;     ///< kClassic: where the next relighting may begin
+  int forward_ray_count = 0;  ///< kClassic
 };
 
 /// Follows a relighting on its way.

@@ -35,8 +35,8 @@ class PointLinks {
   void prepare(const std::vector<int>& slots, const Known& known) const;
 
   /// Adds to the irradiance of every point [lx] what the bright elements send to it; elements of one slot stand
-  /// together. Links what has not been linked. Threads may ask at once.
-  void add_irradiance(std::span<const BrightElement> bright, std::vector<glm::vec3>& irradiance) const;
+  /// together. Links what has not been linked. Threads may ask at once. is_grey: all light is; one channel is computed.
+  void add_irradiance(std::span<const BrightElement> bright, bool is_grey, std::vector<glm::vec3>& irradiance) const;
 
   /// Memory held by links [bytes].
   std::size_t byte_count() const;
@@ -65,11 +65,14 @@ class PointLinks {
     glm::vec3 flux;              // reflected [lm], over pi
   };
   std::size_t bytes_of(const Link& link) const;
-  glm::vec3 exposed_middle(int slot, glm::vec3 normal) const;
+  glm::vec3 exposed_middle(int slot) const;
   std::vector<std::shared_ptr<const Link>> links_of(const std::vector<int>& slots, const Known& known) const;
   std::shared_ptr<const Link> link(int slot, const Known& known) const;
   void link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points, const KnownPoints& known) const;
-  void link_near(Link& link, int slot, glm::vec3 normal, const KnownPoints& known) const;
+  void link_near(Link& link, int slot, const KnownPoints& known) const;
+  template <bool kIsGrey>
+  void add_blocks(const std::vector<LitPatch>& lit, std::span<const BrightElement> bright, std::size_t chunk,
+                  std::vector<glm::vec3>& irradiance) const;
   LitPatch lit_patch(std::span<const BrightElement> bright, std::size_t first, std::size_t last) const;
 
   const LightMesh& mesh_;

@@ -30,6 +30,20 @@ struct BeamMask {
   std::vector<std::vector<std::uint8_t>> crossings;  ///< [group]: that group's openings between visible point and sun
 };
 
+/// Triangles of their own that cast volumes beside those of the scene: the lit part of a panel, or what stands behind
+/// it. `are_solids`: closed solids among them count once, as the scene's do.
+class VolumeCasters {
+ public:
+  VolumeCasters(std::vector<glm::vec3> vertices, std::span<const glm::uvec3> triangles, bool are_solids);
+  ~VolumeCasters();
+  VolumeCasters(VolumeCasters&&) noexcept;
+
+ private:
+  friend class ShadowVolumes;
+  struct Prepared;
+  std::unique_ptr<Prepared> prepared_;
+};
+
 /// Stencil shadow volumes of a fixed scene, for any camera and any beam of parallel light.
 ///
 /// Both sides of a triangle cast: single sheets, closed solids, any orientation, T-junctions and interpenetration. A
@@ -56,8 +70,12 @@ class ShadowVolumes {
   /// fails.
   BeamMask render(const VolumeCamera& camera, glm::dvec3 direction_to_sun);
 
-  /// Passes of the last render: one for visible surfaces unless the camera is the previous one, one for opaque casters,
-  /// one for each opening group whose light can be in the picture.
+  /// How many of the casters lie between each visible point and the source of parallel light, modulo 256.
+  std::vector<std::uint8_t> count(const VolumeCamera& camera, glm::dvec3 direction_to_source,
+                                  const VolumeCasters& casters);
+
+  /// Passes of the last render or count: one for visible surfaces unless the camera is the previous one, one for opaque
+  /// casters, one for each opening group whose light can be in the picture.
   int pass_count() const;
 
  private:

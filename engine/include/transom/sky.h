@@ -35,12 +35,12 @@ class SkyBinIndex {
 };
 
 /// Parallel light: unit direction towards its source, and normal illuminance as linear RGB [lx]. Either the sun itself,
-/// outdoors and through clear openings; or a lobe of it behind the panels of an opening group, with the illuminance that
-/// a panel in full sun gives it.
+/// outdoors and through clear openings; or a lobe of it behind the panels of an opening group, with the illuminance
+/// that a panel in full sun gives it.
 struct Beam {
   glm::vec3 direction_to_source{0, 0, 1};
   glm::vec3 normal_illuminance{0};
-  int opening = -1;                    ///< whose panels send the lobe; -1: the sun itself
+  int opening = -1;                     ///< whose panels send the lobe; -1: the sun itself
   glm::vec3 direction_to_sun{0, 0, 1};  ///< of a lobe: unit, outdoors
   /// Of a lobe: where it is, as Engine::relight has found.
   std::shared_ptr<const std::vector<LightShaft>> shafts = nullptr;

@@ -17,12 +17,15 @@ ROUNDS = 31
 
 
 def bench(
-    scene: Annotated[str, typer.Argument(metavar="SCENE", help="A scene, or the path of its folder.")],
+    scene: Annotated[str | None, typer.Argument(metavar="[SCENE]", help="A scene, or its folder's path.")] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="FILE.json; default build/bench/...")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer points of each sweep, in less time.")] = False,
     budget: Annotated[
         float | None, typer.Option(min=1.0, metavar="SECONDS", help="Time to spend; default 150, or 40 with --quick.")
     ] = None,
+    growth: Annotated[
+        bool, typer.Option("--growth", help="Costs of a hall over patches, openings and triangles; without SCENE.")
+    ] = False,
     speed_error: Annotated[
         bool, typer.Option("--speed-error", help="Time and error of the engine, Mitsuba and Radiance.")
     ] = False,
@@ -51,12 +54,24 @@ def bench(
     --against REV builds that revision and this one from nothing, times them in turn, and judges every phase: exit
     code 1 for one that is slower twice, by more than two processes of one build differ; 3 where more rounds decide.
 
+    --growth measures a hall of its own, up to 30,000 patches, 200 openings and a million triangles, and writes
+    build/bench/growth.json and .svg.
+
     \b
     Example:  transom bench test_room -o bench.json
               transom bench test_room --quick
               transom bench test_room --speed-error
               transom bench test_room --against HEAD~1
+              transom bench --growth
     """
+    if growth:
+        if scene is not None or speed_error or against is not None:
+            remedy = "Leave out SCENE, --speed-error and --against"
+            raise InputError("makes a hall of its own and answers one question", field="--growth", remedy=remedy)
+        _growth(output, quick)
+        return
+    if scene is None:
+        raise InputError("is missing", field="SCENE", remedy="Name a scene, or ask for --growth")
     if against is not None and speed_error:
         raise InputError("and --speed-error are two different questions", field="--against", remedy="Ask one at a time")
     if speed_error:
@@ -91,6 +106,24 @@ def _sizes(scene: str, output: Path | None, budget: float | None, quick: bool, g
     for line in bench_lines(measured):
         typer.echo(line)
     typer.echo(f"{path}: all samples")
+
+
+def _growth(output: Path | None, quick: bool) -> None:
+    from rich.console import Console
+
+    from transom.bench_growth import growth_lines, growth_points, measure_growth, write_growth
+    from transom.figures_speed import growth_figure
+    from transom.files import write_atomic
+    from transom.progress import CaseProgress
+
+    path = _output(output, FOLDER / "growth.json")
+    with CaseProgress(len(growth_points(quick)), Console(stderr=True)) as bars:
+        found = measure_growth(bars, quick=quick)
+    write_growth(path, found)
+    write_atomic(path.with_suffix(".svg"), growth_figure(found))
+    for line in growth_lines(found):
+        typer.echo(line)
+    typer.echo(f"{path} and {path.with_suffix('.svg')}")
 
 
 def _speed_error(

@@ -78,7 +78,8 @@ def _suites() -> list[str]:
 def _products() -> list[str]:
     from transom.products import list_products, load_product
 
-    return _aligned([*GLAZING, *((name, load_product(name).title) for name in list_products())])
+    records = [(name, load_product(name).record) for name in list_products()]
+    return _aligned([*GLAZING, *((name, f"{record.description} [{record.status}]") for name, record in records)])
 
 
 def _aligned(rows: list[tuple[str, str]]) -> list[str]:

@@ -48,7 +48,7 @@ class Errors(BaseModel):
 
 
 class ProductEvaluation(BaseModel):
-    """All figures of one product.
+    """All figures of one product. rays: of the second tracer, for each sun.
 
     represented: by width (rows, WIDTHS_DEG) and count (columns, COUNTS), the mean over incident directions of the
     share of the transmitted light that lies in so many greedy cones; represented_least: the least.
@@ -60,6 +60,7 @@ class ProductEvaluation(BaseModel):
 
     model_config = ConfigDict(frozen=True)
     product: str
+    rays: int
     represented: list[list[float]]
     represented_least: list[list[float]]
     moved_ours: float
@@ -94,6 +95,7 @@ def evaluate(
     _tell(progress, 4)
     return ProductEvaluation(
         product=product.name,
+        rays=rays,
         represented=represented.mean(axis=0).tolist(),
         represented_least=represented.min(axis=0).tolist(),
         moved_ours=float(moved[0]),

@@ -56,7 +56,7 @@ def moved_figure(found: Sequence[ProductEvaluation]) -> bytes:
     axis.set_xticks(places, [p.product.replace("_", "\n") for p in found], fontsize=8)
     axis.set_ylabel("light moved by more than 11.5° [%]")
     axis.grid(axis="y", alpha=0.3)
-    axis.legend(fontsize=8)
+    axis.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0, 1), ncols=3, frameon=False)
     return _png(figure)
 
 
@@ -81,7 +81,7 @@ def room_figure(found: Sequence[ProductEvaluation]) -> bytes:
     axis.set_xticks(places, [p.product.replace("_", "\n") for p in found], fontsize=8)
     axis.set_ylabel("error of floor and desk illuminance [%]")
     axis.grid(axis="y", alpha=0.3)
-    axis.legend(fontsize=8)
+    axis.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0, 1), ncols=3, frameon=False)
     return _png(figure)
 
 

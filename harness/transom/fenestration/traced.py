@@ -20,14 +20,14 @@ Float64 = NDArray[np.float64]
 
 SUN_RAYS = 4096
 GUIDED_RAYS = 1024
-"""Rays that stand for the sun where surfaces are diffuse or curved; fewer where curved glass guides light far, and in
-unit cells. Between flat faces light is followed as beams, exactly."""
+"""Rays that stand for the sun where surfaces are diffuse or curved; fewer where curved glass, or glass that
+repeats along two axes, guides light far. Between flat faces light is followed as beams, exactly."""
 
 BIN_DIRECTIONS = 16
 BIN_RAYS = 16
 """Directions in each incident bin, and rays over a period for each: 256 rays a bin."""
 
-REFLECTED_DIRECTIONS = 8
+REFLECTED_DIRECTIONS = 4
 """Directions in each bin for the reflectance of the room side, which is one number."""
 
 SUNS_KEPT = 256
@@ -50,9 +50,10 @@ class TracedFenestration:
 
     def exits(self, incident: Float64) -> Exits:
         """All light of one direction (3,) that leaves into the room, before it is split."""
-        is_costly = not isinstance(self.geometry, Section) or any(
-            line.bow and line.kind == "interface" for line in self.geometry.lines
-        )
+        if isinstance(self.geometry, Section):
+            is_costly = any(line.bow and line.kind == "interface" for line in self.geometry.lines)
+        else:
+            is_costly = any(surface.kind == "interface" for surface in self.geometry.surfaces)
         return self.geometry.trace(incident, GUIDED_RAYS if is_costly else SUN_RAYS, SEED).transmitted
 
     @cached_property

@@ -66,7 +66,7 @@ class Measurement:
 def measure(
     product: Product,
     rays: int | None = None,
-    directions: int = 64,
+    directions: int = 96,
     seed: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Measurement:

@@ -30,6 +30,7 @@ LOBE_WIDTH_DEG = 23.0
 LEAST_SHARE = 0.005
 """Of the transmitted light: a cone with less is no lobe worth a circle."""
 
+LABEL = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.7}
 DECADES = 4
 COLUMNS = 4
 
@@ -87,7 +88,7 @@ def plot_lobes(title: str, suns: Sequence[SunDirection], traced: Sequence[Traced
     top = 10 ** math.ceil(math.log10(highest)) if highest > 0 else 1.0
     columns = min(COLUMNS, len(suns))
     rows = math.ceil(len(suns) / columns)
-    figure = Figure(figsize=(3.1 * columns + 0.9, 3.5 * rows + 0.7), layout="constrained")
+    figure = Figure(figsize=(max(3.1 * columns + 0.9, 5.5), 3.5 * rows + 0.7), layout="constrained")
     norm = LogNorm(top / 10**DECADES, top)
     mesh = None
     for number, (sun, light, values) in enumerate(zip(suns, traced, density, strict=True)):
@@ -100,7 +101,13 @@ def plot_lobes(title: str, suns: Sequence[SunDirection], traced: Sequence[Traced
             axes.plot(circle[:, 0], circle[:, 1], color="tab:orange", linewidth=1.5)
             x, y = _place(lobe.direction[None])[0]
             axes.annotate(
-                f"{100 * lobe.share:.0f} %", (x, y), (15, 0), textcoords="offset points", fontsize=8, va="center"
+                f"{100 * lobe.share:.0f} %",
+                (x, y),
+                (15, 0),
+                textcoords="offset points",
+                fontsize=8,
+                va="center",
+                bbox=LABEL,
             )
         axes.plot(*_place(sun.incident[None])[0], marker="o", color="tab:blue", markersize=7, markeredgecolor="white")
         held = 100 * sum(lobe.share for lobe in lobes)
@@ -113,7 +120,7 @@ def plot_lobes(title: str, suns: Sequence[SunDirection], traced: Sequence[Traced
         bar = figure.colorbar(mesh, ax=figure.axes, shrink=0.75, pad=0.02)
         bar.set_label("share of the incident light per solid angle [1/sr]", fontsize=9)
     figure.suptitle(
-        f"{title}: light in the room. Blue: where unbent light would go; orange: lobes of {LOBE_WIDTH_DEG:g}°, "
+        f"{title}: light in the room\nblue: where unbent light would go; orange: lobes of {LOBE_WIDTH_DEG:g}° "
         "with their share of T",
         fontsize=9,
     )

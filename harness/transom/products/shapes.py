@@ -134,16 +134,17 @@ def curved_lamellae(
     gap: float = 0.003,
 ) -> Section:
     """Curved bars stacked between two panes of glass, which guide light by total reflection. slope_out, slope_in: of
-    the bars at the outdoor and the room end, degrees from horizontal, positive rising into the room."""
-    _require(spacing > thickness > 0 and depth > 0, "0 < thickness < spacing and depth > 0")
+    the bars at the outdoor and the room end, degrees from horizontal, positive rising into the room. Bars as thick as
+    their spacing lie on each other, with a gap of air without width between them."""
+    _require(spacing >= thickness > 0 and depth > 0, "0 < thickness <= spacing and depth > 0")
     start, end = pane + gap, pane + gap + depth
     middle, turn = math.radians(slope_out + slope_in) / 2, math.radians(slope_in - slope_out)
     low = (0.0, start), (depth * math.tan(middle), end)
     high = (thickness, start), (depth * math.tan(middle) + thickness, end)
     bow = 0.5 * depth / math.cos(middle) * math.tan(turn / 4)
+    faces = [Line(*low, left=0, right=1, bow=bow), Line(*high, left=1, right=0, bow=bow)]
     lines = [
-        Line(*low, left=0, right=1, bow=bow),
-        Line(*high, left=1, right=0, bow=bow),
+        *(faces if thickness < spacing else [Line(*low, "gap", 1, 1, bow=bow)]),
         Line(low[0], high[0], left=1, right=0),
         Line(low[1], high[1], left=0, right=1),
         *_pane(0.0, pane, spacing, 2),

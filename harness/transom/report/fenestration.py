@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,12 +14,13 @@ from transom.bundle import Bundle
 from transom.daylight.condition import Condition, resolve_condition
 from transom.fenestration.panels import panel_axes
 from transom.products import load_product
+from transom.products.lobe_plot import SunDirection, plot_lobes
+from transom.report import rows_fenestration
 from transom.report.numbers import fixed, words
 from transom.report.pictures import Picture, find_pictures, illustration
-from transom.report.plots import PlotOrder, find_plots
+from transom.report.plots import PlotOrder, find_plots, png_picture
 from transom.report.results import Results
-from transom.report.rows_fenestration import WRITTEN, glazing_words, transport, written_table
-from transom.report.rows_fenestration import speed as speed_rows
+from transom.report.rows_fenestration import EVALUATE, glazing_words
 from transom.report.sections import FENESTRATION, RoomSection, condition_words, error_words, rooms, suite_rows
 from transom.report.speed import Speed
 from transom.report.table import Table
@@ -29,6 +31,14 @@ from transom.suite import Suite
 PRISM_PRODUCT = "prismatic_panel"
 PRISM_SCENE = "test_room"
 FACING_SOUTH = np.array([0.0, -1.0, 0.0])
+
+LOBE_PRODUCT = "laser_cut_panel"
+LOBE_SUNS = (SunDirection(30.0, 0.0), SunDirection(50.0, 40.0))
+LOBE_FIGURES = (
+    ("represented.png", "Fraction of the transmitted light in k lobes of full angle alpha, by product"),
+    ("moved.png", "Light put more than 11.5° from where it goes, for directions left out of the table"),
+    ("room.png", "Errors of floor and desk illuminance: median (mark) and 90th percentile (end of the line)"),
+)
 
 FIGURES = {
     "test_room": "The paper's Figures 4 and 7: the upper panes of the test room",
@@ -89,12 +99,13 @@ class PrismFigure:
 @dataclass(frozen=True)
 class Chapter:
     """Everything of the chapter but its tables. rooms: a viewer for each product that has a reference. plots: those of
-    transom.report.plots, None where there is none."""
+    transom.report.plots, None where there is none. lobes: figures of lobes, the paper's Figure 6 first."""
 
     galleries: list[Gallery]
     rooms: list[RoomSection]
     prism: PrismFigure
     plots: list[tuple[PlotOrder, Picture | None]]
+    lobes: list[Picture]
 
 
 def make_chapter(suites: Sequence[Suite], results: Results, build: Path) -> Chapter:
@@ -105,15 +116,26 @@ def make_chapter(suites: Sequence[Suite], results: Results, build: Path) -> Chap
         rooms=[room for suite in chosen for room in rooms(suite)],
         prism=prism_figure(),
         plots=find_plots(build),
+        lobes=[figure_6(), *lobe_figures(build)],
     )
 
 
 def chapter_tables(suites: Sequence[Suite], results: Results, speed: Speed, build: Path) -> list[Table]:
-    """Transport by product, what the study of lobes wrote, and speed."""
+    """Transport by product, how well lobes stand for products, and speed."""
     scenes = {entry.scene.name: entry.scene for suite in suites for entry in suite.cases if suite.name == FENESTRATION}
     images, sensors = (suite_rows(rows, [FENESTRATION]) for rows in (results.images, results.sensors))
-    written = [written_table(build / "lobes", expected) for expected in WRITTEN]
-    return [transport(images, sensors, scenes), *written, speed_rows(speed.variants)]
+    file = build / "lobes" / "evaluation.json"
+    found = rows_fenestration.read_evaluations(file)
+    source = f"transom lobes --evaluate, SHA-256 {hashlib.sha256(file.read_bytes()).hexdigest()[:12]}" if found else ""
+    return [
+        rows_fenestration.transport(images, sensors, scenes),
+        rows_fenestration.references(build / "lobes"),
+        rows_fenestration.representation(found, source),
+        rows_fenestration.represented(found, source),
+        rows_fenestration.interpolation(found, source),
+        rows_fenestration.energy(found, source),
+        rows_fenestration.speed(speed.variants),
+    ]
 
 
 def galleries(suite: Suite, results: Results) -> list[Gallery]:
@@ -159,6 +181,21 @@ def prism_figure() -> PrismFigure:
     data = json.dumps({name: parameters[name] for name in names})
     source = f"btdf_measurements/{PRISM_PRODUCT}/product.toml"
     return PrismFigure(product.title, data, sliders, suns, source)
+
+
+def figure_6() -> Picture:
+    """The paper's Figure 6: the laser cut panel's light of two suns, with the paper's lobes."""
+    product = load_product(LOBE_PRODUCT)
+    tracer = product.tracer()
+    drawn = plot_lobes(product.title, LOBE_SUNS, [tracer.trace(sun.incident) for sun in LOBE_SUNS])
+    caption = f"After the paper's Figure 6: {product.title.lower()}, two suns, lobes of 23° by share"
+    return png_picture(caption, drawn, f"btdf_measurements/{LOBE_PRODUCT}/product.toml")
+
+
+def lobe_figures(build: Path) -> list[Picture]:
+    """Figures that `transom lobes --evaluate` drew."""
+    files = [(build / "lobes" / name, caption) for name, caption in LOBE_FIGURES]
+    return [png_picture(caption, file.read_bytes(), EVALUATE) for file, caption in files if file.is_file()]
 
 
 def profile_angle_deg(condition: Condition) -> float | None:

@@ -109,7 +109,14 @@ def _record(content: Content, folder: Path) -> dict[str, Any]:
             for view in room.views
             if view.viewer
         ],
-        "plots": [_picture(plot, folder) for _, plot in content.pictures.fenestration.plots if plot],
+        "plots": [
+            _picture(plot, folder)
+            for plot in (
+                *(plot for _, plot in content.pictures.fenestration.plots),
+                *content.pictures.fenestration.lobes,
+            )
+            if plot
+        ],
         "galleries": [
             {
                 "title": gallery.title,

@@ -95,10 +95,13 @@ def find_plots(build: Path) -> list[tuple[PlotOrder, Picture | None]]:
     return [(order, _picture(order, build / "plots" / f"{order.name}.png")) for order in ORDERS]
 
 
-def _picture(order: PlotOrder, file: Path) -> Picture | None:
-    if not file.is_file():
-        return None
-    image = Image.open(io.BytesIO(file.read_bytes()))
+def png_picture(caption: str, content: bytes, source: str) -> Picture:
+    """A figure that was drawn as a PNG; what the file says of its own source goes before `source`."""
+    image = Image.open(io.BytesIO(content))
     pixels = np.asarray(image.convert("RGB"))
-    source = str(image.info.get(SOURCE, "")) or order.command
-    return Picture(order.caption, webp_bytes(pixels, lossless=True), image.width, image.height, source)
+    own = str(image.info.get(SOURCE, ""))
+    return Picture(caption, webp_bytes(pixels, lossless=True), image.width, image.height, own or source)
+
+
+def _picture(order: PlotOrder, file: Path) -> Picture | None:
+    return png_picture(order.caption, file.read_bytes(), order.command) if file.is_file() else None

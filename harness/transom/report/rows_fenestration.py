@@ -1,17 +1,18 @@
-"""Tables of the chapter on complex fenestration: transport by product, speed, and what other commands have written."""
+"""Tables of the chapter on complex fenestration: transport by product, speed, and how well lobes stand for products."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from transom.bench import Bench
 from transom.errors import InputError, invalid_field
 from transom.fenestration.choice import is_file
+from transom.fenestration.evaluation import COUNTS, WIDTHS_DEG, Errors, ProductEvaluation
+from transom.fenestration.paper_modes import COUNT as PAPER_COUNT
 from transom.judge import Outcome
 from transom.products import load_product
 from transom.report.numbers import seconds, words
@@ -24,24 +25,9 @@ RUN = "transom run fenestration"
 BENCH = "transom bench test_room --glazing south_upper=lumitop_like"
 
 
-@dataclass(frozen=True)
-class Expected:
-    """A table that another command writes to build/lobes/NAME.json in the form of tables.json."""
-
-    name: str
-    title: str
-    command: str
-
-
-WRITTEN = (
-    Expected("cfs_references", "References of rooms with products, against each other", "transom referees"),
-    Expected(
-        "cfs_representation", "Representation: lobes and residual against an independent ray set", "transom lobes"
-    ),
-    Expected("cfs_represented", "Represented fraction over number and width of lobes", "transom lobes"),
-    Expected("cfs_interpolation", "Interpolation between directions: the paper's against ours", "transom lobes"),
-    Expected("cfs_energy", "Energy of tables, and of lobes with their residual", "transom lobes"),
-)
+EVALUATE = "transom lobes --evaluate"
+REFEREES = "transom referees"
+REFERENCES = "cfs_references"
 
 
 def glazing_words(scene: Scene) -> str:
@@ -108,18 +94,99 @@ def speed(benches: Iterable[Bench]) -> Table:
     return Table("cfs_speed", "Speed with products", head, tuple(rows), BENCH)
 
 
-def written_table(folder: Path, expected: Expected) -> Table:
-    """The table as it was written; without rows where it was not. Raises InputError for a malformed file."""
-    file = folder / f"{expected.name}.json"
+def read_evaluations(file: Path) -> list[ProductEvaluation]:
+    """What `transom lobes --evaluate` wrote; none where it has not run. Raises InputError for another form."""
     if not file.is_file():
-        return Table(expected.name, expected.title, ("",), (), expected.command)
+        return []
+    try:
+        return TypeAdapter(list[ProductEvaluation]).validate_json(file.read_bytes())
+    except ValidationError as error:
+        raise invalid_field(error, file) from error
+
+
+def representation(found: Sequence[ProductEvaluation], source: str) -> Table:
+    """Errors of floor and desk illuminance by what stands for the product, against an independent tracer."""
+    parts = ("traced", "tabulated", "sky", "tracer")
+    rows = [
+        Row((Cell(words(entry.product)), *(_quantiles(getattr(entry, part)) for part in parts)), source)
+        for entry in found
+    ]
+    head = ("Product", "Sun, traced there", "Sun, from a table", "Clear sky", "Rays without lobes")
+    title = "Representation: error of floor and desks, median / p90 [%]"
+    return Table("cfs_representation", title, head, tuple(rows), EVALUATE)
+
+
+def represented(found: Sequence[ProductEvaluation], source: str) -> Table:
+    """Share of the transmitted light in k greedy cones of full angle alpha: mean over incident directions."""
+    rows = []
+    for entry in found:
+        for width, mean, least in zip(WIDTHS_DEG, entry.represented, entry.represented_least, strict=True):
+            shares = [number(100 * value, 1) for value in mean]
+            worst = number(100 * least[PAPER_COUNT - 1], 1)
+            rows.append(Row((number(width, 0), *shares, worst), source, words(entry.product)))
+    head = ("alpha [°]", *(f"k = {count} [%]" for count in COUNTS), f"least of k = {PAPER_COUNT} [%]")
+    title = "Represented fraction over number k and width alpha of lobes"
+    return Table("cfs_represented", title, head, tuple(rows), EVALUATE)
+
+
+def interpolation(found: Sequence[ProductEvaluation], source: str) -> Table:
+    """Light that a direction left out of the table puts more than 11.5 degrees from where it goes."""
+    rows = []
+    for entry in found:
+        moved = (entry.moved_ours, entry.moved_rank, entry.moved_paper, entry.moved_nearest)
+        ratio = entry.moved_ours / entry.moved_rank if entry.moved_rank > 0 else None
+        cells = (*(number(100 * share, 1) for share in moved), number(ratio, 2))
+        rows.append(Row((Cell(words(entry.product)), *cells), source))
+    head = (
+        "Product",
+        "Ours [%]",
+        "Same lobes by rank [%]",
+        "Paper: 3 of 23° by rank [%]",
+        "Nearest [%]",
+        "Ours / rank",
+    )
+    title = "Interpolation: light moved by more than 11.5°, directions left out of a 12° grid"
+    return Table("cfs_interpolation", title, head, tuple(rows), EVALUATE)
+
+
+def energy(found: Sequence[ProductEvaluation], source: str) -> Table:
+    """Transmittance against the second tracer's, and of lobes with their residual against the rays that were split."""
+    rows = []
+    for entry in found:
+        difference, uncertainty, split = (
+            1e4 * value
+            for value in (
+                entry.transmittance_mean_difference,
+                entry.transmittance_uncertainty,
+                entry.split_difference,
+            )
+        )
+        cells = (signed_number(difference, 2), number(uncertainty, 2), Cell(f"{split:.1e}", split))
+        rows.append(Row((Cell(words(entry.product)), *cells), source))
+    head = ("Product", "T against another tracer [1e-4]", "its uncertainty [1e-4]", "Lobes + residual − T [1e-4]")
+    return Table(
+        "cfs_energy", "Energy: mean over 24 suns, in shares of the incident light", head, tuple(rows), EVALUATE
+    )
+
+
+def references(folder: Path) -> Table:
+    """References of rooms with products against each other, as `transom referees` wrote them; without rows where it
+    did not. Raises InputError for a malformed file."""
+    title, file = "References of rooms with products, against each other", folder / f"{REFERENCES}.json"
+    if not file.is_file():
+        return Table(REFERENCES, title, ("",), (), REFEREES)
     try:
         tables = TablesFile.model_validate_json(file.read_bytes()).tables
     except ValidationError as error:
         raise invalid_field(error, file) from error
-    found = next((table for table in tables if table.name == expected.name), None)
+    found = next((table for table in tables if table.name == REFERENCES), None)
     if found is None:
         names = [table.name for table in tables]
-        raise InputError("has no table of that name", file=file, field="tables", value=names, remedy=expected.command)
+        raise InputError("has no table of that name", file=file, field="tables", value=names, remedy=REFEREES)
     rows = [Row(tuple(Cell(cell.text, cell.value) for cell in row.cells), row.source, row.group) for row in found.rows]
-    return Table(expected.name, found.title, tuple(found.head), tuple(rows), found.command or expected.command)
+    return Table(REFERENCES, found.title, tuple(found.head), tuple(rows), found.command or REFEREES)
+
+
+def _quantiles(errors: Errors) -> Cell:
+    median, high = (100 * errors.quantile(share) for share in (0.5, 0.9))
+    return Cell(f"{median:.2f} / {high:.2f}", high)

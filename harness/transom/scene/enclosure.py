@@ -19,6 +19,8 @@ BOUNCE_COUNT = 3
 SEED = 20080321
 COVER_M = 0.01
 """A surface this near to an opening covers it; in models below 10 m across, 1 / 1000 of that size."""
+BLOCK = 128
+"""Triangles of a block."""
 CHUNK = 16
 """Rays at once: their table of edge sides stays in the processor's cache for a few thousand triangles."""
 
@@ -39,9 +41,13 @@ class Escape:
 
 
 class TriangleRays:
-    """Nearest hits of rays with all triangles of a mesh, by Plücker coordinates. Double precision, no acceleration."""
+    """Nearest hits of rays with all triangles of a mesh, by Plücker coordinates, in double precision.
 
-    def __init__(self, mesh: Mesh) -> None:
+    A mesh of more than `block_triangles` triangles is looked through in blocks of neighbours, of which a ray tests
+    those whose bounding boxes it meets: the same hits in time that grows with the blocks, not with the triangles.
+    """
+
+    def __init__(self, mesh: Mesh, block_triangles: int = 8192) -> None:
         self.mesh = mesh
         self.triangles, self.source = mesh.triangles()
         self.centre = mesh.vertices.mean(axis=0)
@@ -55,6 +61,38 @@ class TriangleRays:
             start, end = corners[:, k], corners[:, (k + 1) % 3]
             edges.append(np.concatenate([np.cross(start, end), end - start], axis=1).T)
         self.edges = edges
+        self.blocks: NDArray[np.intp] | None = None
+        if len(corners) > block_triangles:
+            self._make_blocks(corners)
+
+    def _make_blocks(self, corners: Float64) -> None:
+        """Blocks (B, BLOCK) of triangles, -1 where there are no more, along Morton's curve, and their boxes."""
+        middle = corners.mean(axis=1)
+        low = middle.min(axis=0)
+        cell = (1023.999 * (middle - low) / max(float(np.ptp(middle, axis=0).max()), 1e-30)).astype(np.int64)
+        curve = np.zeros(len(cell), dtype=np.int64)
+        for bit in range(10):
+            for axis in range(3):
+                curve |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
+        order = np.argsort(curve, kind="stable")
+        count = -(-len(order) // BLOCK)
+        self.blocks = np.full((count, BLOCK), -1, dtype=np.intp)
+        self.blocks.reshape(-1)[: len(order)] = order
+        first = np.arange(count) * BLOCK
+        margin = 1e-6 * self.scale
+        self.low = np.minimum.reduceat(corners.min(axis=1)[order], first) - margin
+        self.high = np.maximum.reduceat(corners.max(axis=1)[order], first) + margin
+
+    def _near_triangles(self, origin: Float64, direction: Float64) -> TriangleIndex:
+        """Triangles of the blocks whose boxes a ray meets [slabs after Kay & Kajiya 1986]."""
+        assert self.blocks is not None
+        with np.errstate(divide="ignore", invalid="ignore"):
+            to_low, to_high = (self.low - origin) / direction, (self.high - origin) / direction
+        enters = np.fmax.reduce(np.fmin(to_low, to_high), axis=1)
+        leaves = np.fmin.reduce(np.fmax(to_low, to_high), axis=1)
+        chosen = self.blocks[(leaves >= 0) & (enters <= leaves)].ravel()
+        near: TriangleIndex = chosen[chosen >= 0]
+        return near
 
     def nearest(
         self, origins: Float64, directions: Float64, ignored: NDArray[np.bool_] | None = None
@@ -64,28 +102,41 @@ class TriangleRays:
         ignored: (T,) triangles that rays pass through.
         """
         distances, hits = np.empty(len(origins)), np.empty(len(origins), dtype=np.intp)
+        if self.blocks is not None:
+            for ray, origin in enumerate(origins - self.centre):
+                near = self._near_triangles(origin, directions[ray])
+                part = slice(ray, ray + 1)
+                distances[part], found = self._nearest(origin[None], directions[part], ignored, near)
+                hits[part] = near[found] if len(near) else 0
+            return distances, hits
         for begin in range(0, len(origins), CHUNK):
             part = slice(begin, begin + CHUNK)
             distances[part], hits[part] = self._nearest(origins[part] - self.centre, directions[part], ignored)
         return distances, hits
 
     def _nearest(
-        self, origins: Float64, directions: Float64, ignored: NDArray[np.bool_] | None
+        self,
+        origins: Float64,
+        directions: Float64,
+        ignored: NDArray[np.bool_] | None,
+        chosen: TriangleIndex | slice = slice(None),
     ) -> tuple[Float64, TriangleIndex]:
+        """Of the chosen triangles, numbered among themselves."""
+        all_normals, offsets = self.normals[chosen], self.offsets[chosen]
         line = np.concatenate([directions, np.cross(origins, directions)], axis=1)
         # A line passes on one side of all three edges; the margin closes the cracks between neighbours.
         margin = 1e-9 * self.scale**2
-        first, second, third = (line @ edge for edge in self.edges)
+        first, second, third = (line @ edge[:, chosen] for edge in self.edges)
         lowest = np.minimum(np.minimum(first, second), third)
         highest = np.maximum(np.maximum(first, second), third)
         ray, triangle = np.nonzero((lowest >= -margin) | (highest <= margin))
-        normals = self.normals[triangle]
+        normals = all_normals[triangle]
         speed = np.einsum("ij,ij->i", directions[ray], normals)
         with np.errstate(divide="ignore", invalid="ignore"):
-            distance = (self.offsets[triangle] - np.einsum("ij,ij->i", origins[ray], normals)) / speed
+            distance = (offsets[triangle] - np.einsum("ij,ij->i", origins[ray], normals)) / speed
         met = (np.abs(speed) > 1e-12) & (distance > 1e-6 * self.scale)
         if ignored is not None:
-            met &= ~ignored[triangle]
+            met &= ~ignored[chosen][triangle]
         ray, triangle, distance = ray[met], triangle[met], distance[met]
         # Written from far to near, the nearest hit of each ray is the one that stays.
         order = np.argsort(-distance)
