@@ -147,7 +147,7 @@ void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const
       const glm::vec3 normal = engine_.faces().faces[centre.surface / 2].normal;
       const float height_of_plane = glm::dot(centre.position - eye, normal);
       for (int k = 0; k < s * s; ++k) {
-        const glm::vec3 direction = camera.direction(glm::vec2(x, y) + sample_place(k, s, samples.is_turned));
+        const glm::vec3 direction = camera.direction(glm::vec2(x, y) + sample_place(k, s));
         BeamPoint& point = points.emplace_back(centre);
         point.position = eye + direction * (height_of_plane / glm::dot(direction, normal));
         point.sample = k;
@@ -200,12 +200,10 @@ Frame FrameRenderer::render(const View& view, const Lighting& lighting, FrameOpt
   const TracePhase phase(engine_.trace(), "frame");
   view.validate();
   options.edge_samples = std::max(1, options.edge_samples);
-  const bool is_turned = options.visibility == Visibility::kRays;
-  if (!samples_ || samples_->view != view || samples_->edge_samples != options.edge_samples ||
-      samples_->is_turned != is_turned) {
+  if (!samples_ || samples_->view != view || samples_->edge_samples != options.edge_samples) {
     const TracePhase samples_phase(engine_.trace(), "view");
     samples_.reset();
-    samples_ = std::make_unique<ViewSamples>(engine_, view, options.edge_samples, is_turned);
+    samples_ = std::make_unique<ViewSamples>(engine_, view, options.edge_samples);
     centre_boxes_ = boxes_of(samples_->centre);
     fine_boxes_ = boxes_of(samples_->fine);
     pane_boxes_ = boxes_of(samples_->on_panes);

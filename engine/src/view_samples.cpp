@@ -130,18 +130,17 @@ BeamPoint add_sample(const Engine& engine, const Seen& seen, float weight, int p
 
 }  // namespace
 
-glm::vec2 sample_place(int sample, int samples_per_axis, bool is_turned) {
+glm::vec2 sample_place(int sample, int samples_per_axis) {
   const auto n = static_cast<float>(samples_per_axis);
   const int column = sample % samples_per_axis, row = sample / samples_per_axis;
-  if (!is_turned) return (glm::vec2(column, row) + 0.5f) / n;
   const auto within = [n](int cell, int of_cell) {
     return (static_cast<float>(cell) + (static_cast<float>(of_cell) + 0.5f) / n) / n;
   };
   return {within(column, row), within(row, samples_per_axis - 1 - column)};
 }
 
-ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_per_axis, bool turned)
-    : view(camera), edge_samples(std::max(1, samples_per_axis)), is_turned(turned) {
+ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_per_axis)
+    : view(camera), edge_samples(std::max(1, samples_per_axis)) {
   const int width = view.width, height = view.height, s = edge_samples;
   const auto row_count = static_cast<std::size_t>(height), row_size = static_cast<std::size_t>(width);
   const std::size_t pixel_count = row_count * row_size;
@@ -196,7 +195,7 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
         continue;
       }
       centre[p] = beam_point(engine, seen[p], 1, pixel, -1);
-      for (int k = 0; k < s * s; ++k) points[k] = glm::vec2(x, y) + sample_place(k, s, is_turned);
+      for (int k = 0; k < s * s; ++k) points[k] = glm::vec2(x, y) + sample_place(k, s);
       tracer.trace(points, found, found_panes);
       const float weight = 1 / static_cast<float>(s * s);
       for (int k = 0; k < s * s; ++k) {

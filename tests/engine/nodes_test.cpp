@@ -121,7 +121,7 @@ TEST(Frame, SamplesOfAPixelFindAnEdgeAlongAnAxisToOneOfTheirNumber) {
   for (const int n : {1, 2, 3, 4, 8}) {
     std::set<int> columns, rows, squares;
     for (int k = 0; k < n * n; ++k) {
-      const glm::vec2 place = sample_place(k, n, true);
+      const glm::vec2 place = sample_place(k, n);
       columns.insert(static_cast<int>(place.x * static_cast<float>(n * n)));
       rows.insert(static_cast<int>(place.y * static_cast<float>(n * n)));
       squares.insert(static_cast<int>(place.y * static_cast<float>(n)) * n +

@@ -88,7 +88,12 @@ def test_the_chapter_fits_a_narrow_window(report: Path, tmp_path: Path) -> None:
 def evaluation(**changes: Any) -> ProductEvaluation:
     flat = Errors(relative=[[0.01, -0.02], [0.03, 0.0]])
     shares = [[min(1.0, 0.2 * count + 0.01 * width) for count in COUNTS] for width in WIDTHS_DEG]
-    known: dict[str, Any] = {"product": "prismatic_panel", "rays": 512, "represented": shares, "represented_least": shares}
+    known: dict[str, Any] = {
+        "product": "prismatic_panel",
+        "rays": 512,
+        "represented": shares,
+        "represented_least": shares,
+    }
     known |= {"moved_ours": 0.02, "moved_rank": 0.08, "moved_paper": 0.1, "moved_nearest": 0.12}
     known |= {"traced": flat, "tabulated": flat, "tracer": flat, "sky": flat, "split_difference": 2e-17}
     known |= {"transmittance_mean_difference": -3e-5, "transmittance_uncertainty": 5e-5}

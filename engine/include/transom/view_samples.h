@@ -21,21 +21,18 @@ struct BeamPoint {
   int sample = 0;  ///< of the pixel: row of samples * edge_samples + column
 };
 
-/// Where in its pixel, from its upper left corner, a sample lies: in the middle of its square of an upright grid, or on
-/// a grid turned by atan(1 / samples_per_axis). There each has a square of the upright grid, a column and a row of its
-/// own, so that an edge along an axis of the picture, as most edges of buildings are, is found to 1 /
-/// samples_per_axis^2 of the pixel.
-glm::vec2 sample_place(int sample, int samples_per_axis, bool is_turned);
+/// Where in its pixel, from its upper left corner, a sample lies. Samples are a grid turned by atan(1 /
+/// samples_per_axis): each has a square of the upright grid, a column and a row of its own, so that an edge along an
+/// axis of the picture, as most edges of buildings are, is found to 1 / samples_per_axis^2 of the pixel.
+glm::vec2 sample_place(int sample, int samples_per_axis);
 
 /// The samples of a picture. Pixels without an edge of a surface have one, at their centre; the others
 /// edge_samples^2, all of whose light is summed beforehand as weights.
 struct ViewSamples {
-  /// is_turned: see sample_place. Upright where the samples must be those of a rasteriser.
-  ViewSamples(const Engine& engine, const View& view, int edge_samples, bool is_turned);
+  ViewSamples(const Engine& engine, const View& view, int edge_samples);
 
   View view;
   int edge_samples;
-  bool is_turned;
   std::vector<char> has_edge;       ///< by pixel: an edge of a surface
   std::vector<BeamPoint> centre;    ///< by pixel: the surface at its centre
   std::vector<BeamPoint> fine;      ///< all samples of pixels with an edge

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 FIGURES = "represented", "moved", "room"
 
+DEFAULT_OUTPUT = Path("build/lobes/evaluation.json")
+"""Where the report looks for it."""
+
 
 def lobes(
     products: Annotated[
@@ -28,7 +31,7 @@ def lobes(
     evaluate: Annotated[bool, typer.Option("--evaluate", help="Measure fractions and errors; all products.")] = False,
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="OUT.json", help="Of --evaluate: figures go beside it.")
-    ] = Path("build/lobes/evaluation.json"),
+    ] = DEFAULT_OUTPUT,
     rays: Annotated[int, typer.Option(help="Of the second tracer, for each sun.", min=64, max=65536)] = 1024,
     every: Annotated[int, typer.Option(help="Leave out each such incident direction in turn.", min=1)] = 3,
 ) -> None:
@@ -84,6 +87,8 @@ def _evaluate(products: list[str], output: Path, rays: int, every: int) -> None:
     from transom.products import list_products, load_product
     from transom.progress import single_progress
 
+    if output == DEFAULT_OUTPUT:
+        output.parent.mkdir(parents=True, exist_ok=True)
     checked_output(output, (".json",))
     names = products or list_products()
     chosen = [load_product(name) for name in names]

@@ -35,9 +35,12 @@ FACING_SOUTH = np.array([0.0, -1.0, 0.0])
 LOBE_PRODUCT = "laser_cut_panel"
 LOBE_SUNS = (SunDirection(30.0, 0.0), SunDirection(50.0, 40.0))
 LOBE_FIGURES = (
-    ("represented.png", "Fraction of the transmitted light in k lobes of full angle alpha, by product"),
-    ("moved.png", "Light put more than 11.5° from where it goes, for directions left out of the table"),
-    ("room.png", "Errors of floor and desk illuminance: median (mark) and 90th percentile (end of the line)"),
+    ("evaluation_represented.png", "Fraction of the transmitted light in k lobes of full angle alpha, by product"),
+    ("evaluation_moved.png", "Light put more than 11.5° from where it goes, for directions left out of the table"),
+    (
+        "evaluation_room.png",
+        "Errors of floor and desk illuminance: median (mark), 90th percentile (end of line)",
+    ),
 )
 
 FIGURES = {
