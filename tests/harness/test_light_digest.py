@@ -47,7 +47,7 @@ def test_a_product_traced_to_other_light_is_another_question(monkeypatch: pytest
     class Dimmer:
         basis = product.basis
 
-        def sun(self, incident: object) -> SunThrough:
+        def sun(self, _incident: object) -> SunThrough:
             return SunThrough(through.lobes, 0.9 * through.residual + 1e-3)
 
     monkeypatch.setattr(light, "load_fenestration", lambda _choice: Dimmer())
