@@ -23,7 +23,7 @@ def referees(
 ) -> None:
     """Compare portals, Mitsuba's volpath and Radiance through one file, and the section tracer with particles.
 
-    In the test room, with the product in its upper panes and the lower ones closed. Minutes a product.
+    In the test room, with the product in its upper panes and the lower ones closed. Some minutes a product.
 
     \b
     Example:  transom referees prismatic_panel laser_cut_panel
