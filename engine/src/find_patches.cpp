@@ -53,8 +53,7 @@ std::vector<int> Engine::first_wave() const {
     std::vector<Hit> hits(rays.size());
     rays_->intersect(RayScene::What::kAll, rays, hits);
     for (const Hit& hit : hits)
-      if (hit.face >= 0 && !faces_.is_inside_solid(hit.face, hit.side))
-        wave.push_back(mesh_->slot_at(hit));
+      if (hit.face >= 0 && !faces_.is_inside_solid(hit.face, hit.side)) wave.push_back(mesh_->slot_at(hit));
   }
   std::sort(wave.begin(), wave.end());
   wave.erase(std::unique(wave.begin(), wave.end()), wave.end());
