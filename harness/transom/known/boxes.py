@@ -50,6 +50,8 @@ ROOM_REFLECTANCES = (0.0, 0.2, 0.5, 0.8)
 
 SPHERE_RADIUS_M, SPHERE_LEVEL, SPHERE_REFLECTANCE = 2.0, 2, 0.5
 SPHERE_LAMP_M, SPHERE_LAMP_CD = (0.6, 0.0, 0.0), 1000.0
+SPHERE_DECIMALS = 12
+"""Of its places: linear algebra differs between processors in the last bits, and stored answers must be found again."""
 
 
 @dataclass(frozen=True)
@@ -240,9 +242,10 @@ def sphere() -> list[KnownCase]:
     drawing.material("grey", SPHERE_REFLECTANCE)
     drawing.lamp(SPHERE_LAMP_M, SPHERE_LAMP_CD)
     for corners in shape.corners():
-        drawing.polygon("grey", corners.tolist())
-    points = shape.centroids() + INSET_M * shape.normals()
-    return [KnownCase(drawing.scene(), dark(), sensor_table(points, shape.normals()), _sphere_answers)]
+        drawing.polygon("grey", np.round(corners, SPHERE_DECIMALS).tolist())
+    normals = np.round(shape.normals(), SPHERE_DECIMALS)
+    points = np.round(shape.centroids() + INSET_M * normals, SPHERE_DECIMALS)
+    return [KnownCase(drawing.scene(), dark(), sensor_table(points, normals), _sphere_answers)]
 
 
 def _sphere_answers() -> list[Answer]:
