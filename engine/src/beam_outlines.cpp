@@ -1,6 +1,7 @@
 #include "transom/beam_outlines.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "transom/sampling.h"
@@ -8,6 +9,7 @@
 namespace transom {
 namespace {
 
+constexpr float kEdgeOn = 1e-6f;     // cosine below which a passage lets nothing through
 constexpr float kMarginOffsets = 4;  // of Faces::ray_offset: what rounding and lifted points may shift an outline by
 
 // Whether an edge of `a` parts two convex polygons by more than the margin [separating axes].
@@ -41,7 +43,22 @@ BeamOutlines::BeamOutlines(const Faces& faces, const std::vector<int>& passages,
   along_ = frame[1];
   for (const int f : passages) {
     const Face& face = faces.faces[static_cast<std::size_t>(f)];
-    passages_.push_back(outline({face.corner, face.is_quad ? 4u : 3u}));
+    Passage passage;
+    passage.outline = outline({face.corner, face.is_quad ? 4u : 3u});
+    const float facing = glm::dot(face.normal, towards_), sense = facing > 0 ? 1.f : -1.f;
+    passage.is_edge_on = std::abs(facing) < kEdgeOn;
+    for (int k = 0; k < passage.outline.corner_count; ++k) {
+      const glm::vec2 from = passage.outline.corner[k],
+                      edge = passage.outline.corner[(k + 1) % passage.outline.corner_count] - from;
+      const glm::vec2 in = sense * glm::vec2(-edge.y, edge.x);
+      passage.inwards[k] = {in, -glm::dot(in, from)};
+    }
+    // Of a point (x, y, depth) on the plane: normal . (x across + y along + depth towards) is that of a corner.
+    if (!passage.is_edge_on)
+      passage.depth = glm::vec3(-glm::dot(face.normal, across_), -glm::dot(face.normal, along_),
+                                glm::dot(face.normal, face.corner[0])) /
+                      facing;
+    passages_.push_back(passage);
   }
 }
 
@@ -60,7 +77,8 @@ BeamOutline BeamOutlines::outline(std::span<const glm::vec3> corners) const {
   return result;
 }
 
-bool BeamOutlines::covers(const BeamOutline& passage, const BeamOutline& polygon) const {
+bool BeamOutlines::covers(int k, const BeamOutline& polygon) const {
+  const BeamOutline& passage = passages_[static_cast<std::size_t>(k)].outline;
   if (passage.farthest < polygon.nearest - margin_) return false;
   for (int axis = 0; axis < 2; ++axis)
     if (passage.low[axis] > polygon.high[axis] + margin_ || polygon.low[axis] > passage.high[axis] + margin_)
@@ -70,12 +88,8 @@ bool BeamOutlines::covers(const BeamOutline& passage, const BeamOutline& polygon
 
 void BeamOutlines::covering(const BeamOutline& polygon, std::vector<int>& passages) const {
   passages.clear();
-  for (std::size_t k = 0; k < passages_.size(); ++k)
-    if (covers(passages_[k], polygon)) passages.push_back(static_cast<int>(k));
-}
-
-bool BeamOutlines::is_covered(const BeamOutline& polygon, const std::vector<int>& passages) const {
-  return std::any_of(passages.begin(), passages.end(), [&](int k) { return covers(passages_[k], polygon); });
+  for (int k = 0; k < static_cast<int>(passages_.size()); ++k)
+    if (covers(k, polygon)) passages.push_back(k);
 }
 
 }  // namespace transom

@@ -44,6 +44,33 @@ class DirectLight::Patterns {
   std::vector<glm::vec2> points_;
 };
 
+// A slot that the sun may reach, and the openings that its light may pass on the way to it.
+struct DirectLight::SunlitSlot {
+  std::size_t receiver;
+  bool is_behind_openings;
+  std::vector<int> passages;  // places in openings_
+};
+
+// The openings as the sun sees them.
+class DirectLight::Sun {
+ public:
+  Sun(const DirectLight& light, const Beam& sun)
+      : beam(sun), outlines(light.mesh_.faces(), light.openings_, sun.direction_to_source) {
+    for (const int f : light.openings_) {
+      // From indoors, light comes only through openings whose outer side faces it. Small ones send their light
+      // themselves.
+      const float facing = glm::dot(light.mesh_.faces().faces[f].normal, sun.direction_to_source);
+      lets_in.push_back(facing > 0 && !light.is_small_opening_[f]);
+      transmittance.push_back(light.rays_.opening_transmittance(f, sun.direction_to_source));
+    }
+  }
+  const Beam& beam;
+  BeamOutlines outlines;
+  // By opening:
+  std::vector<char> lets_in;
+  std::vector<float> transmittance;
+};
+
 DirectLight::Receivers DirectLight::receivers(const std::vector<int>& slots,
                                               std::vector<char> is_behind_openings) const {
   Receivers receivers{slots, std::move(is_behind_openings), {}, {}};
@@ -67,7 +94,8 @@ DirectLight::DirectLight(const LightMesh& mesh, const RayScene& rays, const std:
     const Face& face = mesh.faces().faces[f];
     if (materials[face.material].opening < 0) continue;
     is_small_opening_[f] = face.area < small_opening_m2;
-    (is_small_opening_[f] ? small_openings_ : large_openings_).push_back(static_cast<int>(f));
+    openings_.push_back(static_cast<int>(f));
+    if (is_small_opening_[f]) small_openings_.push_back(static_cast<int>(f));
   }
   for (const PointSource& source : sources)
     sources_.push_back({glm::vec3(source.position - mesh.faces().origin), source.intensity});
@@ -144,19 +172,17 @@ std::vector<glm::vec3> DirectLight::points_on(int slot_index, const Corners& cor
 }
 
 // The few samples that every element of the candidates has: share of a beam, kSamplesPerElement an element.
-std::vector<float> DirectLight::sample_sun(const Beam& sun, const Receivers& receivers,
-                                           const std::vector<std::size_t>& candidates, const Patterns& patterns) const {
+std::vector<float> DirectLight::sample_sun(const Sun& sun, const Receivers& receivers,
+                                           const std::vector<SunlitSlot>& candidates, const Patterns& patterns) const {
   std::vector<int> elements(static_cast<std::size_t>(mesh_.elements_per_slot()));
   std::iota(elements.begin(), elements.end(), 0);
   const std::size_t samples_per_slot = elements.size() * kSamplesPerElement;
   std::vector<float> share(candidates.size() * samples_per_slot);
   parallel_indices(candidates.size(), kGrain, [&](std::size_t k) {
-    const std::size_t i = candidates[k];
+    const std::size_t i = candidates[k].receiver;
     const std::vector<glm::vec3> points =
         points_on(receivers.slots[i], receivers.corners[i], elements, kSamplesPerElement, patterns);
-    const std::span<float> of_slot(&share[k * samples_per_slot], samples_per_slot);
-    beam_transmission(sun, points, of_slot);
-    ignore_small_openings(sun.direction_to_source, points, of_slot);
+    sun_transmission(sun, candidates[k], points, {&share[k * samples_per_slot], samples_per_slot});
   });
   return share;
 }
@@ -199,22 +225,19 @@ std::vector<int> DirectLight::partly_lit(int slot_index, const std::vector<int>&
 // the mean, made up for.
 void DirectLight::add_sun(const Beam& sun, const Receivers& receivers, const Patterns& patterns,
                           std::vector<std::vector<glm::vec3>>& sum, BeamPlan& plan) const {
-  // From indoors, light comes only through openings whose outer side faces it.
-  std::vector<int> facing;
-  for (const int f : large_openings_)
-    if (glm::dot(mesh_.faces().faces[f].normal, sun.direction_to_source) > 0) facing.push_back(f);
-  const std::vector<std::size_t> candidates = reached(sun.direction_to_source, receivers, facing);
-  plan.facing_openings += static_cast<int>(facing.size());
+  const Sun seen(*this, sun);
+  const std::vector<SunlitSlot> candidates = reached(seen, receivers);
+  plan.facing_openings += static_cast<int>(std::count(seen.lets_in.begin(), seen.lets_in.end(), 1));
   plan.patches += static_cast<int>(candidates.size());
   if (candidates.empty()) return;
   ++plan.beams;
-  const std::vector<float> share = sample_sun(sun, receivers, candidates, patterns);
+  const std::vector<float> share = sample_sun(seen, receivers, candidates, patterns);
   std::vector<int> place_of_slot(static_cast<std::size_t>(mesh_.slot_count()), -1);
   for (std::size_t k = 0; k < candidates.size(); ++k)
-    place_of_slot[receivers.slots[candidates[k]]] = static_cast<int>(k);
+    place_of_slot[receivers.slots[candidates[k].receiver]] = static_cast<int>(k);
   const int per_slot = mesh_.elements_per_slot();
   parallel_indices(candidates.size(), kGrain, [&](std::size_t k) {
-    const std::size_t i = candidates[k];
+    const std::size_t i = candidates[k].receiver;
     const glm::vec3 full = sun.normal_illuminance * glm::dot(sun.direction_to_source, receivers.normals[i]);
     const float* own = &share[k * static_cast<std::size_t>(per_slot * kSamplesPerElement)];
     std::vector<float> mean(static_cast<std::size_t>(per_slot));
@@ -226,8 +249,7 @@ void DirectLight::add_sun(const Beam& sun, const Receivers& receivers, const Pat
     std::vector<float> refined(elements.size() * kRefinedSamplesPerElement);
     const std::vector<glm::vec3> points =
         points_on(receivers.slots[i], receivers.corners[i], elements, kRefinedSamplesPerElement, patterns);
-    beam_transmission(sun, points, refined);
-    ignore_small_openings(sun.direction_to_source, points, refined);
+    sun_transmission(seen, candidates[k], points, refined);
     for (std::size_t n = 0; n < elements.size(); ++n)
       mean[elements[n]] = std::accumulate(&refined[n * kRefinedSamplesPerElement],
                                           &refined[n * kRefinedSamplesPerElement] + kRefinedSamplesPerElement, 0.f) /
@@ -247,25 +269,59 @@ void DirectLight::sources_on_slot(int slot_index, const Corners& corners, glm::v
         point_source_illuminance(points[i], normal) / static_cast<float>(kSourceSamplesPerElement);
 }
 
-// The receivers that a beam may reach.
-std::vector<std::size_t> DirectLight::reached(glm::vec3 direction, const Receivers& receivers,
-                                              const std::vector<int>& openings) const {
-  std::vector<std::size_t> found;
-  const BeamOutlines outlines(mesh_.faces(), openings, direction);
+// The receivers that the sun may reach.
+std::vector<DirectLight::SunlitSlot> DirectLight::reached(const Sun& sun, const Receivers& receivers) const {
+  std::vector<SunlitSlot> found;
   int known_face = -1;
-  std::vector<int> passages;  // over that face
+  std::vector<int> over_face, over_slot;
   for (std::size_t i = 0; i < receivers.slots.size(); ++i) {
-    if (mesh_.is_cluster(receivers.slots[i]) || glm::dot(direction, receivers.normals[i]) <= 0) continue;
-    if (receivers.is_behind_openings[i]) {
-      const int f = mesh_.slot(receivers.slots[i]).face;
-      const Face& face = mesh_.faces().faces[f];
-      if (f != known_face) outlines.covering(outlines.outline({face.corner, face.is_quad ? 4u : 3u}), passages);
-      known_face = f;
-      if (passages.empty() || !outlines.is_covered(outlines.outline(receivers.corners[i]), passages)) continue;
-    }
-    found.push_back(i);
+    if (mesh_.is_cluster(receivers.slots[i]) || glm::dot(sun.beam.direction_to_source, receivers.normals[i]) <= 0)
+      continue;
+    const int f = mesh_.slot(receivers.slots[i]).face;
+    const Face& face = mesh_.faces().faces[f];
+    if (f != known_face) sun.outlines.covering(sun.outlines.outline({face.corner, face.is_quad ? 4u : 3u}), over_face);
+    known_face = f;
+    const BeamOutline outline = sun.outlines.outline(receivers.corners[i]);
+    over_slot.clear();
+    for (const int k : over_face)
+      if (sun.outlines.covers(k, outline)) over_slot.push_back(k);
+    const bool is_behind = receivers.is_behind_openings[i] != 0;
+    if (is_behind && std::none_of(over_slot.begin(), over_slot.end(), [&](int k) { return sun.lets_in[k] != 0; }))
+      continue;
+    found.push_back({i, is_behind, over_slot});
   }
   return found;
+}
+
+// Share of the sun's light that arrives at lifted points of a slot, but for what comes through a small opening first.
+// Where openings stand in the way is known in closed form: rays look for what is opaque, and only from points that
+// openings let light to.
+void DirectLight::sun_transmission(const Sun& sun, const SunlitSlot& slot, std::span<const glm::vec3> points,
+                                   std::span<float> share) const {
+  thread_local std::vector<Ray> rays;
+  thread_local std::vector<std::size_t> index;
+  thread_local std::vector<std::uint8_t> blocked;
+  rays.clear();
+  index.clear();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    bool is_crossed = false;
+    share[i] = 1;
+    const glm::vec3 place = sun.outlines.along_beam(points[i]);
+    for (const int k : slot.passages)
+      if (sun.outlines.is_before(k, place)) {
+        share[i] *= sun.transmittance[k];
+        is_crossed = true;
+      }
+    if (slot.is_behind_openings && !is_crossed) share[i] = 0;
+    if (share[i] <= 0) continue;
+    rays.push_back({points[i], sun.beam.direction_to_source});
+    index.push_back(i);
+  }
+  blocked.resize(rays.size());
+  rays_.occluded(RayScene::What::kOpaque, rays, blocked, RayScene::Order::kCoherent);
+  for (std::size_t k = 0; k < rays.size(); ++k)
+    if (blocked[k]) share[index[k]] = 0;
+  ignore_small_openings(sun.beam.direction_to_source, points, share);
 }
 
 // Faces of a cluster look many ways: each sample asks for the light at its own place.

@@ -18,6 +18,8 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr std::size_t kGrain = 8;
+constexpr double kSmoothTolerance = 1e-3;  // of interreflection, for lights that only have to look like others
+constexpr int kMostCycles = 1000;
 constexpr double kConnectedShare = 0.05;  // emitters up to this share of the interior's area are connected, not hit
 
 }  // namespace
@@ -71,12 +73,17 @@ void Engine::solve(const Engine* solved) {
     const TracePhase phase(trace_, "transfer");
     assemble_transfer(known);
     link_panels();
+    lit_by_sources_ = direct_light_->deposit({}, receivers_, hash_seed(options_.seed, kBeamStream));
   }
   if (options_.method == Method::kClassic) {
     const TracePhase phase(trace_, "forward rays");
     solve_classic();
   } else {
-    lit_by_sources_ = direct_light_->deposit({}, receivers_, hash_seed(options_.seed, kBeamStream));
+    {
+      const TracePhase phase(trace_, "likeness");
+      find_smooth_lights();
+      interreflection_->prepare(smooth_lights_);
+    }
     {
       const TracePhase phase(trace_, "nodes");
       gather_nodes(known);
@@ -175,11 +182,41 @@ void Engine::assemble_transfer(const Known& known) {
   }
   std::vector<PatchPlace> places(n);
   for (std::size_t p = 0; p < n; ++p) {
-    places[p] = {mesh_->middle_of(slot_of_patch_[p]).position, mesh_->normal_of(slot_of_patch_[p])};
+    places[p] = {mesh_->middle_of(slot_of_patch_[p]).position, mesh_->normal_of(slot_of_patch_[p]),
+                 faces_.faces[mesh_->slot(slot_of_patch_[p]).face].material};
   }
   interreflection_ =
       std::make_unique<Interreflection>(*form_factors_, through_, patch_reflectance_, patch_area_, places);
   facts_.cluster_count = interreflection_->cluster_count();
+}
+
+// What patches send when an even sky is all there is, and when lamps are: light that has the shape of the light of many
+// conditions once it has been reflected.
+void Engine::find_smooth_lights() {
+  const std::size_t n = slot_of_patch_.size();
+  const std::vector<glm::vec3> nothing(n, glm::vec3(0));
+  std::vector<glm::vec3> from_sky = nothing, from_lamps = nothing;
+  for (std::size_t p = 0; p < n; ++p)
+    for (std::size_t k = patch_sky_.begin[p]; k < patch_sky_.begin[p + 1]; ++k)
+      from_sky[p] += glm::vec3(patch_sky_.entries[k].weight);
+  for (const LitElement& e : lit_by_sources_) {
+    const int per_slot = mesh_->elements_per_slot(), patch = patch_of_slot_[e.element / per_slot];
+    from_lamps[patch] += e.illuminance * element_share_[patch * per_slot + e.element % per_slot];
+  }
+  has_sky_ = from_sky != nothing;
+  smooth_lights_.clear();
+  const auto add = [&](const std::vector<glm::vec3>& emitted, const std::vector<glm::vec3>& direct) {
+    std::vector<glm::vec3> irradiance;
+    interreflection_->solve({emitted, direct}, kSmoothTolerance, kMostCycles, irradiance);
+    std::vector<float> radiosity(n);
+    for (std::size_t p = 0; p < n; ++p) {
+      const glm::vec3 sent = emitted[p] + patch_reflectance_[p] * irradiance[p];
+      radiosity[p] = (sent.x + sent.y + sent.z) / 3;
+    }
+    smooth_lights_.push_back(std::move(radiosity));
+  };
+  if (has_sky_) add(nothing, from_sky);
+  if (from_lamps != nothing || patch_emitted_ != nothing) add(patch_emitted_, from_lamps);
 }
 
 // Patches that a beam may light: they see some of the sky.

@@ -129,9 +129,9 @@ void Engine::gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& f
   std::vector<glm::vec4> radiosity(slot_of_patch_.size());
   for (std::size_t p = 0; p < radiosity.size(); ++p) radiosity[p] = glm::vec4(lighting.patch_smooth_radiosity[p], 0);
   lighting.node_indirect.resize(first_reflection.size());
+  const HalfColours sent_by_patches(radiosity, lighting.plan.is_grey);
   parallel_indices(first_reflection.size(), 64, [&](std::size_t i) {
-    lighting.node_indirect[i] =
-        first_reflection[i] + glm::vec3(node_rows_->patches.dot(i, radiosity) + node_through_.dot(i, radiosity));
+    lighting.node_indirect[i] = first_reflection[i] + node_patches_.dot(i, sent_by_patches);
   });
   // What is seen close by is not as even as its patch: the nodes on it, as they are now, speak for it.
   std::vector<glm::vec4> sent(first_reflection.size());

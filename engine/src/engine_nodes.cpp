@@ -14,8 +14,6 @@ namespace {
 constexpr std::size_t kGrain = 8;
 constexpr float kExposedNode = 0.5f;  // a node counts when at least this share of its rays is outside solids
 
-constexpr double kTrialTolerance = 1e-3;  // of interreflection
-constexpr int kTrialCycles = 1000;
 constexpr float kSunnySky = 0.25f;  // share of the sky in what makes light indoors, where the sun does the rest
 constexpr float kDark = 0.05f;      // of the mean over nodes: errors below it are not seen
 
@@ -32,10 +30,6 @@ constexpr float kLargeForBuried = 3;  // and the leniency up to which they are
 constexpr float kLookNear = 1.5f, kLookFar = 3, kLookSplit = 0.75f;
 constexpr float kSteep = 6;     // and is divided whatever its middle says: a step may be half up in the middle
 constexpr float kNear = 0.25f;  // length of a part against the distance of what it sees
-
-float mean(glm::vec3 v) {
-  return (v.x + v.y + v.z) / 3;
-}
 
 }  // namespace
 
@@ -87,29 +81,10 @@ struct Engine::NodeTrial {
 // An even sky, all of it seen; the same mostly as what it makes surfaces send, which is the shape of what the sun makes
 // them send on the mean over its places; and what lamps do.
 std::vector<Engine::TrialLight> Engine::trial_lights() const {
-  const std::size_t n = slot_of_patch_.size();
   std::vector<TrialLight> lights;
-  const auto add = [&](const std::vector<glm::vec3>& emitted, const std::vector<glm::vec3>& direct,
-                       std::initializer_list<float> skies) {
-    std::vector<glm::vec3> irradiance;
-    interreflection_->solve({emitted, direct}, kTrialTolerance, kTrialCycles, irradiance);
-    std::vector<float> radiosity(n);
-    for (std::size_t p = 0; p < n; ++p) radiosity[p] = mean(emitted[p] + patch_reflectance_[p] * irradiance[p]);
-    for (const float sky : skies) lights.push_back({radiosity, sky, {}});
-  };
-  std::vector<glm::vec3> from_sky(n, glm::vec3(0)), from_lamps(n, glm::vec3(0));
-  for (std::size_t p = 0; p < n; ++p)
-    for (std::size_t k = patch_sky_.begin[p]; k < patch_sky_.begin[p + 1]; ++k)
-      from_sky[p] += glm::vec3(patch_sky_.entries[k].weight);
-  for (const LitElement& e : lit_by_sources_) {
-    const int per_slot = mesh_->elements_per_slot(), patch = patch_of_slot_[e.element / per_slot];
-    from_lamps[patch] += e.illuminance * element_share_[patch * per_slot + e.element % per_slot];
-  }
-  const auto is_dark = [](const std::vector<glm::vec3>& light) {
-    return std::all_of(light.begin(), light.end(), [](glm::vec3 value) { return value == glm::vec3(0); });
-  };
-  if (!is_dark(from_sky)) add(std::vector<glm::vec3>(n, glm::vec3(0)), from_sky, {1, kSunnySky});
-  if (!is_dark(from_lamps) || !is_dark(patch_emitted_)) add(patch_emitted_, from_lamps, {0});
+  if (has_sky_)
+    for (const float sky : {1.f, kSunnySky}) lights.push_back({smooth_lights_.front(), sky, {}});
+  if (smooth_lights_.size() > (has_sky_ ? 1 : 0)) lights.push_back({smooth_lights_.back(), 0, {}});
   return lights;
 }
 
@@ -289,6 +264,7 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
       static_cast<int>(std::count_if(known.node.begin(), known.node.end(), [](int node) { return node >= 0; }));
   known.has_same_nodes = !known.nodes_by_seed.empty() && nodes_->nodes() == known.engine->nodes_->nodes();
   const auto found = std::make_shared<NodeRows>();
+  SparseRows all;
   for (std::size_t i = 0; i < trial.rows.size(); ++i) {
     const GatherRow& row = trial.rows[i];
     found->patches.append(row.reached);
@@ -298,7 +274,12 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
     found->harmonic_distance.push_back(row.harmonic_distance);
     node_sky_.append(row.sky);
     node_through_.append(row.through);
+    std::vector<Share> patches = row.reached;
+    patches.insert(patches.end(), row.through.begin(), row.through.end());
+    merge_shares(patches);
+    all.append(patches);
   }
+  node_patches_ = CompactRows(all);
   node_rows_ = found;
 }
 

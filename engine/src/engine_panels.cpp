@@ -191,10 +191,15 @@ bool Engine::solve_with_panels(Lighting& lighting, const Interreflection::AfterC
   const TracePhase phase(trace_, "interreflection");
   const std::size_t n = slot_of_patch_.size();
   std::vector<glm::vec3> direct(n), radiosity;
+  std::vector<int> bright;
+  for (std::size_t p = 0; p < n; ++p)
+    if (is_interior_[p] && (lighting.patch_sun[p] != glm::vec3(0) || patch_emitted_[p] != glm::vec3(0)))
+      bright.push_back(static_cast<int>(p));
   for (int round = 0; round < kMaximumRounds; ++round) {
     for (std::size_t p = 0; p < n; ++p) direct[p] = lighting.patch_sky[p] + lighting.patch_sun[p];
-    const int cycles = interreflection_->solve({patch_emitted_, direct, lighting.plan.is_grey}, options_.tolerance,
-                                               kMaximumCycles, lighting.patch_irradiance, after_cycle);
+    const int cycles =
+        interreflection_->solve({patch_emitted_, direct, lighting.plan.is_grey, bright}, options_.tolerance,
+                                kMaximumCycles, lighting.patch_irradiance, after_cycle);
     if (cycles == 0) return false;
     lighting.sweeps += cycles;
     if (panel_patches_.entries.empty()) return true;

@@ -3,7 +3,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <map>
 #include <stdexcept>
 #include <tuple>
@@ -15,35 +14,37 @@ namespace {
 
 constexpr int kLargestClusterCount = 320;
 constexpr std::size_t kGrain = 128;
-constexpr float kNearShare = 4e-3f;  // form factors from here on stay for themselves in the likeness
-constexpr int kInnerCycles = 2;      // with the likeness: they leave about as much as it is wrong by
-constexpr std::size_t kLanes = 8;    // sums side by side, of the products of a dense row
+constexpr float kLikeness = 3e-4f;      // of what a patch receives: what a group may err by
+constexpr std::size_t kProbeStep = 37;  // patches, between those that are lit to measure how fast light converges
+constexpr double kSafety = 2;           // on what has been measured
+constexpr int kInnerCycles = 3;         // with the likeness: they leave about as much as it is wrong by
 
-// Sums side by side: vectors as GCC and Clang have them, whatever the instruction set.
-using Lanes = float __attribute__((vector_size(sizeof(float) * kLanes)));
-using Integers = int __attribute__((vector_size(sizeof(int) * kLanes)));
-using Counts = std::uint16_t __attribute__((vector_size(sizeof(std::uint16_t) * kLanes)));
-
-template <typename Vector, typename Scalar>
-__attribute__((always_inline)) inline Vector load(const Scalar* from) {
-  Vector vector;
-  std::memcpy(&vector, from, sizeof(vector));
-  return vector;
+// Light of one channel, and of three.
+float to(float, glm::vec3 colour) {
+  return colour.x;
+}
+glm::vec4 to(glm::vec4, glm::vec3 colour) {
+  return {colour, 0};
+}
+glm::vec3 colour_of(float value) {
+  return glm::vec3(value);
+}
+glm::vec3 colour_of(glm::vec4 value) {
+  return value;
+}
+float size_of(float value) {
+  return std::abs(value);
+}
+float size_of(glm::vec4 value) {
+  return std::abs(value.x) + std::abs(value.y) + std::abs(value.z);
 }
 
-SparseRows sum_of(const SparseRows& a, const SparseRows& b) {
+SparseRows transposed(const SparseRows& rows) {
+  std::vector<std::vector<Share>> columns(rows.row_count());
+  for (std::size_t i = 0; i < rows.row_count(); ++i)
+    for (const Share& share : rows.row(i)) columns[share.index].push_back({static_cast<int>(i), share.weight});
   SparseRows result;
-  std::vector<Share> row;
-  for (std::size_t i = 0; i < a.row_count(); ++i) {
-    row.assign(a.entries.begin() + static_cast<std::ptrdiff_t>(a.begin[i]),
-               a.entries.begin() + static_cast<std::ptrdiff_t>(a.begin[i + 1]));
-    if (b.begin[i] != b.begin[i + 1]) {
-      row.insert(row.end(), b.entries.begin() + static_cast<std::ptrdiff_t>(b.begin[i]),
-                 b.entries.begin() + static_cast<std::ptrdiff_t>(b.begin[i + 1]));
-      merge_shares(row);
-    }
-    result.append(row);
-  }
+  for (const std::vector<Share>& column : columns) result.append(column);
   return result;
 }
 
@@ -59,10 +60,15 @@ int main_direction(glm::vec3 n) {
 Interreflection::Interreflection(const SparseRows& form_factors, const SparseRows& through,
                                  std::vector<glm::vec3> reflectance, std::vector<float> areas,
                                  const std::vector<PatchPlace>& places)
-    : exchange_(sum_of(form_factors, through)), reflectance_(std::move(reflectance)), areas_(std::move(areas)) {
+    : form_factors_(form_factors),
+      through_(through),
+      sent_through_(transposed(through)),
+      reflectance_(std::move(reflectance)),
+      areas_(std::move(areas)),
+      groups_(places, areas_) {
   find_clusters(places);
   find_operators();
-  find_likeness();
+  prepare({});
 }
 
 // Patches in one cube of space that face about the same way. The cubes grow until the clusters are few enough.
@@ -100,8 +106,9 @@ void Interreflection::find_operators() {
   for (std::size_t i = 0; i < areas_.size(); ++i) {
     cluster_area_[cluster_of_[i]] += areas_[i];
     cluster_reflectance_[cluster_of_[i]] += areas_[i] * reflectance_[i];
-    for (std::size_t k = exchange_.begin[i]; k < exchange_.begin[i + 1]; ++k)
-      exchange(cluster_of_[i], cluster_of_[exchange_.entries[k].index]) += areas_[i] * exchange_.entries[k].weight;
+    for (const SparseRows* rows : {&form_factors_, &through_})
+      for (std::size_t k = rows->begin[i]; k < rows->begin[i + 1]; ++k)
+        exchange(cluster_of_[i], cluster_of_[rows->entries[k].index]) += areas_[i] * rows->entries[k].weight;
   }
   for (Eigen::Index c = 0; c < m; ++c) exchange.row(c) /= std::max(cluster_area_[c], 1e-30f);
   Matrix system = Matrix::Identity(m, m);
@@ -117,115 +124,139 @@ void Interreflection::find_operators() {
     operator_.assign(operator_.size(), 0.f);
 }
 
-void Interreflection::find_likeness() {
+void Interreflection::prepare(std::span<const std::vector<float>> smooth_lights) {
+  std::vector<PatchGroups::TypicalLight> lights;
+  for (const std::vector<float>& light : smooth_lights) lights.push_back(groups_.typical(light));
   const std::size_t n = areas_.size();
-  far_stride_ = (static_cast<std::size_t>(cluster_count_) + kLanes - 1) / kLanes * kLanes;
-  far_.assign(n * far_stride_, 0);
-  far_scale_.assign(n, 0);
-  std::vector<std::vector<Share>> near(n);
+  std::vector<std::vector<Share>> rows(n);
   parallel_indices(n, kGrain, [&](std::size_t i) {
-    std::vector<float> far(far_stride_, 0.f);
-    for (std::size_t k = exchange_.begin[i]; k < exchange_.begin[i + 1]; ++k) {
-      const Share& share = exchange_.entries[k];
-      if (share.weight >= kNearShare)
-        near[i].push_back(share);
-      else
-        far[static_cast<std::size_t>(cluster_of_[share.index])] += share.weight;
-    }
-    const float most = *std::max_element(far.begin(), far.end());
-    if (!(most > 0)) return;
-    far_scale_[i] = most / 65535;
-    for (std::size_t c = 0; c < far_stride_; ++c)
-      far_[i * far_stride_ + c] = static_cast<std::uint16_t>(std::lround(far[c] / far_scale_[i]));
+    rows[i] = form_factors_.row(i);
+    const std::vector<Share> through = through_.row(i);
+    rows[i].insert(rows[i].end(), through.begin(), through.end());
+    if (lights.empty()) return;
+    std::vector<float> received;
+    for (const PatchGroups::TypicalLight& light : lights)
+      received.push_back(form_factors_.dot(i, light.radiosity) + through_.dot(i, light.radiosity));
+    rows[i] = groups_.grouped(rows[i], lights, received, kLikeness);
   });
-  for (const std::vector<Share>& row : near) near_.append(row);
+  SparseRows all;
+  for (const std::vector<Share>& row : rows) all.append(row);
+  likeness_ = CompactRows(all);
+  foretold_shrinking_ = lights.empty() ? 1 : std::min(1., kSafety * measured_shrinking());
 }
 
-void Interreflection::cluster_means(const std::vector<glm::vec4>& values, std::vector<glm::vec4>& means) const {
-  means.assign(static_cast<std::size_t>(cluster_count_), glm::vec4(0));
-  for (std::size_t i = 0; i < values.size(); ++i) means[cluster_of_[i]] += areas_[i] * values[i];
+// How much less is left over after a second cycle than after a first, of light on patches here and there.
+double Interreflection::measured_shrinking() const {
+  const std::vector<glm::vec3> emitted(areas_.size(), glm::vec3(0));
+  std::vector<glm::vec3> direct = emitted, irradiance;
+  std::vector<int> bright;
+  for (std::size_t i = 0; i < areas_.size(); i += kProbeStep) {
+    direct[i] = glm::vec3(1);
+    bright.push_back(static_cast<int>(i));
+  }
+  std::vector<glm::vec4> radiosity, left;
+  begin({emitted, direct, false, bright}, left, radiosity);
+  const double first = cycle({emitted, direct}, left, radiosity, irradiance),
+               second = cycle({emitted, direct}, left, radiosity, irradiance);
+  return first > 0 ? second / first : 0;
+}
+
+template <typename Value>
+void Interreflection::cluster_means(const std::vector<Value>& values, std::vector<Value>& means) const {
+  means.assign(static_cast<std::size_t>(cluster_count_), Value(0));
+  for (std::size_t i = 0; i < areas_.size(); ++i) means[cluster_of_[i]] += areas_[i] * values[i];
   for (std::size_t c = 0; c < means.size(); ++c) means[c] /= std::max(cluster_area_[c], 1e-30f);
 }
 
-// What the likeness of the exchange makes of a radiosity and of its means over clusters.
-template <bool kIsGrey>
-void Interreflection::reflect_likeness(const std::vector<glm::vec4>& radiosity, const std::vector<glm::vec4>& mean,
-                                       std::vector<glm::vec4>& irradiance) const {
-  std::vector<float> channel[3];
-  for (int c = 0; c < 3; ++c) {
-    channel[c].assign(far_stride_, 0.f);
-    for (std::size_t k = 0; k < mean.size(); ++k) channel[c][k] = mean[k][c];
-  }
-  const float *red = channel[0].data(), *green = channel[1].data(), *blue = channel[2].data();
-  parallel_indices(areas_.size(), kGrain, [&](std::size_t i) {
-    const std::uint16_t* row = &far_[i * far_stride_];
-    Lanes r = {}, g = {}, b = {};
-    for (std::size_t k = 0; k < far_stride_; k += kLanes) {
-      const Lanes weight = __builtin_convertvector(__builtin_convertvector(load<Counts>(row + k), Integers), Lanes);
-      r += weight * load<Lanes>(red + k);
-      if constexpr (!kIsGrey) {
-        g += weight * load<Lanes>(green + k);
-        b += weight * load<Lanes>(blue + k);
-      }
+// What is left over before anything has been reflected. Of bright patches it is the first reflection of what they send,
+// which itself is taken for done.
+template <typename Value>
+void Interreflection::begin(const PatchLight& light, std::vector<Value>& left, std::vector<Value>& radiosity) const {
+  const std::size_t n = areas_.size();
+  left.resize(n);
+  radiosity.assign(n, Value(0));
+  for (std::size_t i = 0; i < n; ++i) left[i] = to(Value(), light.emitted[i] + reflectance_[i] * light.direct[i]);
+  std::vector<Value> received(n, Value(0));
+  for (const int bright : light.bright) {
+    const auto j = static_cast<std::size_t>(bright);
+    radiosity[j] = left[j];
+    left[j] = Value(0);
+    const Value flux = areas_[j] * radiosity[j];
+    for (std::size_t k = form_factors_.begin[j]; k < form_factors_.begin[j + 1]; ++k) {
+      const Share& share = form_factors_.entries[k];
+      received[share.index] += share.weight / areas_[share.index] * flux;
     }
-    glm::vec4 sum(0);
-    for (std::size_t lane = 0; lane < kLanes; ++lane)
-      sum += kIsGrey ? glm::vec4(glm::vec3(r[lane]), 0) : glm::vec4(r[lane], g[lane], b[lane], 0);
-    irradiance[i] = far_scale_[i] * sum + near_.dot(i, radiosity);
-  });
+    for (std::size_t k = sent_through_.begin[j]; k < sent_through_.begin[j + 1]; ++k)
+      received[sent_through_.entries[k].index] += sent_through_.entries[k].weight * radiosity[j];
+  }
+  if (light.bright.empty()) return;
+  for (std::size_t i = 0; i < n; ++i) left[i] += to(Value(), reflectance_[i]) * received[i];
 }
 
 // Adds to a radiosity what is left over, and all that its further reflections bring, by the likeness.
-void Interreflection::carry_on(const std::vector<glm::vec4>& left, bool is_grey,
-                               std::vector<glm::vec4>& radiosity) const {
+template <typename Value>
+void Interreflection::carry_on(const std::vector<Value>& left, std::vector<Value>& radiosity) const {
   const std::size_t n = areas_.size(), m = static_cast<std::size_t>(cluster_count_);
-  std::vector<glm::vec4> sum = left, received(n), mean, mean_after, carried(m);
+  std::vector<Value> sum = left, received(n), mean, mean_after, carried(m);
   cluster_means(sum, mean);
   for (int cycle = 0; cycle < kInnerCycles; ++cycle) {
-    if (is_grey)
-      reflect_likeness<true>(sum, mean, received);
-    else
-      reflect_likeness<false>(sum, mean, received);
-    for (std::size_t i = 0; i < n; ++i) sum[i] = left[i] + glm::vec4(reflectance_[i], 0) * received[i];
+    groups_.append_means(sum);
+    const HalfColours sent(sum);
+    parallel_indices(n, kGrain, [&](std::size_t i) { received[i] = to(Value(), likeness_.dot(i, sent)); });
+    for (std::size_t i = 0; i < n; ++i) sum[i] = left[i] + to(Value(), reflectance_[i]) * received[i];
     cluster_means(sum, mean_after);
     for (std::size_t c = 0; c < m; ++c) mean[c] = mean_after[c] - mean[c];
     parallel_indices(m, 32, [&](std::size_t c) {
-      glm::vec4 all(0);
+      Value all(0);
       for (std::size_t k = 0; k < m; ++k) all += operator_[c * m + k] * mean[k];
       carried[c] = all;
     });
-    for (std::size_t i = 0; i < n; ++i) sum[i] += glm::vec4(reflectance_[i], 0) * carried[cluster_of_[i]];
-    for (std::size_t c = 0; c < m; ++c) mean[c] = mean_after[c] + glm::vec4(cluster_reflectance_[c], 0) * carried[c];
+    for (std::size_t i = 0; i < n; ++i) sum[i] += to(Value(), reflectance_[i]) * carried[cluster_of_[i]];
+    for (std::size_t c = 0; c < m; ++c) mean[c] = mean_after[c] + to(Value(), cluster_reflectance_[c]) * carried[c];
   }
   for (std::size_t i = 0; i < n; ++i) radiosity[i] += sum[i];
 }
 
-int Interreflection::solve(const PatchLight& light, double tolerance, int maximum_cycles,
-                           std::vector<glm::vec3>& irradiance, const AfterCycle& after_cycle) const {
+// One cycle: returns what is then left over, relative to all flux.
+template <typename Value>
+double Interreflection::cycle(const PatchLight& light, std::vector<Value>& left, std::vector<Value>& radiosity,
+                              std::vector<glm::vec3>& irradiance) const {
   const std::size_t n = areas_.size();
-  std::vector<glm::vec4> radiosity(n, glm::vec4(0)), left(n);
-  for (std::size_t i = 0; i < n; ++i) left[i] = glm::vec4(light.emitted[i] + reflectance_[i] * light.direct[i], 0);
-  irradiance = light.direct;
+  irradiance.resize(n);
+  carry_on(left, radiosity);
+  parallel_indices(n, kGrain, [&](std::size_t i) {
+    irradiance[i] = light.direct[i] + colour_of(form_factors_.dot(i, radiosity) + through_.dot(i, radiosity));
+    left[i] = to(Value(), light.emitted[i] + reflectance_[i] * irradiance[i]) - radiosity[i];
+  });
+  double rest = 0, total = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    rest += areas_[i] * size_of(left[i]);
+    total += areas_[i] * size_of(radiosity[i]);
+  }
+  return total > 0 ? rest / total : 0;
+}
+
+template <typename Value>
+int Interreflection::solve_as(const PatchLight& light, double tolerance, int maximum_cycles,
+                              std::vector<glm::vec3>& irradiance, const AfterCycle& after_cycle) const {
+  std::vector<Value> left, radiosity;
+  begin(light, left, radiosity);
   double before = 0;
-  for (int cycle = 1; cycle <= maximum_cycles; ++cycle) {
-    carry_on(left, light.is_grey, radiosity);
-    parallel_indices(n, kGrain, [&](std::size_t i) {
-      irradiance[i] = light.direct[i] + glm::vec3(exchange_.dot(i, radiosity));
-      left[i] = glm::vec4(light.emitted[i] + reflectance_[i] * irradiance[i], 0) - radiosity[i];
-    });
-    double change = 0, total = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-      change += areas_[i] * (std::abs(left[i].x) + std::abs(left[i].y) + std::abs(left[i].z));
-      total += areas_[i] * (std::abs(radiosity[i].x) + std::abs(radiosity[i].y) + std::abs(radiosity[i].z));
-    }
-    const double shrinks_by = cycle > 1 ? change / before : 1;
-    if (!(change > 0) || change <= tolerance * total ||
-        (shrinks_by < 1 && change * shrinks_by / (1 - shrinks_by) <= tolerance * total))
-      return cycle;
-    before = change;
-    if (after_cycle && !after_cycle(cycle, irradiance)) return 0;
+  for (int number = 1; number <= maximum_cycles; ++number) {
+    const double rest = cycle(light, left, radiosity, irradiance);
+    const double shrinks_by = number > 1 ? rest / before : foretold_shrinking_;
+    if (!(rest > 0) || rest <= tolerance || (shrinks_by < 1 && rest * shrinks_by / (1 - shrinks_by) <= tolerance))
+      return number;
+    before = rest;
+    if (after_cycle && !after_cycle(number, irradiance)) return 0;
   }
   throw std::runtime_error("interreflection has not converged: is the room closed and almost perfectly white?");
+}
+
+int Interreflection::solve(const PatchLight& light, double tolerance, int maximum_cycles,
+                           std::vector<glm::vec3>& irradiance, const AfterCycle& after_cycle) const {
+  return light.is_grey ? solve_as<float>(light, tolerance, maximum_cycles, irradiance, after_cycle)
+                       : solve_as<glm::vec4>(light, tolerance, maximum_cycles, irradiance, after_cycle);
 }
 
 }  // namespace transom

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <numeric>
 
 #include "transom/parallel.h"
 
@@ -14,6 +16,23 @@ constexpr float kFar = 4;  // diameters from which a patch counts as a point: th
 constexpr std::size_t kMemory = 512u << 20;  // for links [bytes]
 constexpr float kLeastDistance2 = 1e-15f;    // keeps 0 / 0 out of weights that are 0; its square is a normal number
 constexpr std::size_t kBlocksAtOnce = 8;
+constexpr float kEven = 1e-3f;  // relative difference of elements that count as evenly lit
+
+// Sums of every eighth product: the order in which they are added is fixed, whatever the instruction set.
+inline float weighted_sum(const float* weight, const std::vector<float>& value) {
+  float sums[8] = {};
+  std::size_t k = 0;
+  for (; k + 8 <= value.size(); k += 8)
+    for (std::size_t lane = 0; lane < 8; ++lane) sums[lane] += weight[k + lane] * value[k + lane];
+  for (std::size_t lane = 0; k < value.size(); ++k, ++lane) sums[lane] += weight[k] * value[k];
+  return ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]));
+}
+
+// Of what is stored of it.
+inline float seen_share(std::uint8_t seen) {
+  const float root = static_cast<float>(static_cast<int>(seen)) * (1.f / 255);
+  return root * root;
+}
 
 // Shares of light that arrive at the end of segments: 0 behind something opaque, else the transmittance on the way.
 // is_glazed: whether there are openings on the way.
@@ -112,6 +131,8 @@ std::shared_ptr<const PointLinks::Link> PointLinks::link(int slot_index, const K
   const glm::vec3 normal = mesh_.normal_of(slot_index), middle = exposed_middle(slot_index);
   const float size2 = 2 * mesh_.slot_area(slot_index), size = std::sqrt(size2);
   auto link = std::make_shared<Link>();
+  for (int e = slot_index * mesh_.elements_per_slot(); e < (slot_index + 1) * mesh_.elements_per_slot(); ++e)
+    link->element.emplace_back(mesh_.middle_of_element(e).position, mesh_.element_area(e));
   std::vector<int> far_points;
   std::vector<float> height(kBlock), distance2(kBlock), cosine(kBlock);
   for (std::size_t begin = 0; begin < x_.size(); begin += kBlock) {
@@ -130,6 +151,7 @@ std::shared_ptr<const PointLinks::Link> PointLinks::link(int slot_index, const K
   }
   const KnownPoints known_points{before.get(), known};
   link_far(*link, middle, far_points, known_points);
+  weigh_far(*link, slot_index);
   link_near(*link, slot_index, known_points);
   // What is taken over may be glazed, too.
   for (int i = 0; before && known.has_same_glazing && i < static_cast<int>(point_count_); ++i)
@@ -173,6 +195,39 @@ void PointLinks::link_far(Link& link, glm::vec3 middle, const std::vector<int>& 
   }
 }
 
+// Irradiance of a point per intensity along the normal of a small surface at `centre`, whatever stands between.
+inline float PointLinks::point_weight(glm::vec3 centre, glm::vec3 normal, std::size_t point) const {
+  const float dx = centre.x - x_[point], dy = centre.y - y_[point], dz = centre.z - z_[point];
+  const float height = std::max(0.f, -(dx * normal.x + dy * normal.y + dz * normal.z));
+  const float cosine = std::max(0.f, dx * nx_[point] + dy * ny_[point] + dz * nz_[point]);
+  const float distance2 = std::max(kLeastDistance2, dx * dx + dy * dy + dz * dz);
+  return height * cosine / (distance2 * distance2);
+}
+
+// Far points take all of an evenly lit patch to be at its centroid.
+void PointLinks::weigh_far(Link& link, int slot) const {
+  glm::vec3 centroid(0);
+  float area = 0;
+  for (const glm::vec4& element : link.element) {
+    centroid += element.w * glm::vec3(element);
+    area += element.w;
+  }
+  if (!(area > 0)) return;
+  centroid /= area;
+  const glm::vec3 normal = mesh_.normal_of(slot);
+  std::vector<float> weight(link.seen.size());
+  for (std::size_t k = 0; k < weight.size(); ++k)
+    if (link.seen[k] > 0)
+      weight[k] =
+          area / kPi * seen_share(link.seen[k]) *
+          point_weight(centroid, normal, static_cast<std::size_t>(link.block[k / kBlock]) * kBlock + k % kBlock);
+  const float most = weight.empty() ? 0.f : *std::max_element(weight.begin(), weight.end());
+  if (!(most > 0)) return;
+  link.weight_unit = most / std::numeric_limits<std::uint16_t>::max();
+  for (const float value : weight)
+    link.weight.push_back(static_cast<std::uint16_t>(std::lround(value / link.weight_unit)));
+}
+
 void PointLinks::link_near(Link& link, int slot, const KnownPoints& known) const {
   const auto element_count = static_cast<std::size_t>(mesh_.elements_per_slot());
   std::vector<ElementShape> shapes;
@@ -212,13 +267,18 @@ void PointLinks::link_near(Link& link, int slot, const KnownPoints& known) const
     weights[unknown[k]] *= shares[k];
     if (is_glazed[k]) link.glazed_point.push_back(kept[unknown[k] / element_count]);
   }
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    const auto first = weights.begin() + static_cast<std::ptrdiff_t>(k * element_count);
+    link.near_sum.push_back(std::accumulate(first, first + static_cast<std::ptrdiff_t>(element_count), 0.f));
+  }
   link.near_point = std::move(kept);
   link.near_weight = std::move(weights);
 }
 
 std::size_t PointLinks::bytes_of(const Link& link) const {
   return sizeof(int) * (link.block.size() + link.near_point.size() + link.glazed_point.size()) + link.seen.size() +
-         sizeof(float) * link.near_weight.size();
+         sizeof(std::uint16_t) * link.weight.size() + sizeof(float) * (link.near_weight.size() + link.near_sum.size()) +
+         sizeof(glm::vec4) * link.element.size();
 }
 
 void PointLinks::prepare(const std::vector<int>& slots, const Known& known) const {
@@ -262,28 +322,38 @@ std::vector<std::shared_ptr<const PointLinks::Link>> PointLinks::links_of(const 
   return found;
 }
 
-PointLinks::LitPatch PointLinks::lit_patch(std::span<const BrightElement> bright, std::size_t first,
-                                           std::size_t last) const {
-  const int slot = bright[first].element / mesh_.elements_per_slot();
-  LitPatch patch{nullptr, first, last, glm::vec3(0), mesh_.normal_of(slot), glm::vec3(0)};
+PointLinks::LitPatch PointLinks::lit_patch(std::shared_ptr<const Link> link, std::span<const BrightElement> bright,
+                                           std::size_t first, std::size_t last) const {
+  const int per_slot = mesh_.elements_per_slot();
+  LitPatch patch;
+  patch.normal = mesh_.normal_of(bright[first].element / per_slot);
+  patch.radiosity = bright[first].radiosity;
+  for (std::vector<float>& channel : patch.sent) channel.assign(static_cast<std::size_t>(per_slot), 0.f);
   float sum = 0;
   for (std::size_t k = first; k < last; ++k) {
-    const float area = mesh_.element_area(bright[k].element);
+    const int e = bright[k].element % per_slot;
+    const glm::vec4 element = link->element[e];
     const glm::vec3 radiosity = bright[k].radiosity;
-    const float weight = area * (radiosity.x + radiosity.y + radiosity.z);
-    patch.centroid += weight * mesh_.middle_of_element(bright[k].element).position;
-    patch.flux += area / kPi * radiosity;
+    const float weight = element.w * (radiosity.x + radiosity.y + radiosity.z);
+    patch.centroid += weight * glm::vec3(element);
+    patch.flux += element.w / kPi * radiosity;
     sum += weight;
+    for (int channel = 0; channel < 3; ++channel) patch.sent[channel][e] = radiosity[channel];
   }
   if (sum > 0) patch.centroid /= sum;
+  for (std::size_t e = 0; e < link->element.size() && patch.is_even; ++e)
+    for (int channel = 0; channel < 3; ++channel)
+      patch.is_even &= link->element[e].w <= 0 ||
+                       std::abs(patch.sent[channel][e] - patch.radiosity[channel]) <= kEven * patch.radiosity[channel];
+  patch.link = std::move(link);
   return patch;
 }
 
 // What lit patches send to the points of a few blocks.
 template <bool kIsGrey>
-void PointLinks::add_blocks(const std::vector<LitPatch>& lit, std::span<const BrightElement> bright, std::size_t chunk,
+void PointLinks::add_blocks(const std::vector<LitPatch>& lit, std::size_t chunk,
                             std::vector<glm::vec3>& irradiance) const {
-  const int per_slot = mesh_.elements_per_slot();
+  const auto per_slot = static_cast<std::size_t>(mesh_.elements_per_slot());
   const std::size_t block_count = x_.size() / kBlock;
   const std::size_t first_block = chunk * kBlocksAtOnce,
                     last_block = std::min(block_count, first_block + kBlocksAtOnce), base = first_block * kBlock;
@@ -293,15 +363,25 @@ void PointLinks::add_blocks(const std::vector<LitPatch>& lit, std::span<const Br
     const glm::vec3 c = patch.centroid, m = patch.normal, flux = patch.flux;
     auto block = std::lower_bound(link.block.begin(), link.block.end(), static_cast<int>(first_block));
     for (; block != link.block.end() && *block < static_cast<int>(last_block); ++block) {
-      const std::uint8_t* seen = &link.seen[static_cast<std::size_t>(block - link.block.begin()) * kBlock];
-      const std::size_t from = static_cast<std::size_t>(*block) * kBlock, to = from - base;
+      const std::size_t from = static_cast<std::size_t>(*block) * kBlock, to = from - base,
+                        place = static_cast<std::size_t>(block - link.block.begin()) * kBlock;
+      if (patch.is_even) {
+        if (link.weight.empty()) break;
+        const std::uint16_t* known = &link.weight[place];
+        const glm::vec3 scale = link.weight_unit * patch.radiosity;
+        for (std::size_t k = 0; k < kBlock; ++k) {
+          const float weight = static_cast<float>(static_cast<int>(known[k]));
+          red[to + k] += weight * scale.x;
+          if constexpr (!kIsGrey) {
+            green[to + k] += weight * scale.y;
+            blue[to + k] += weight * scale.z;
+          }
+        }
+        continue;
+      }
+      const std::uint8_t* seen = &link.seen[place];
       for (std::size_t k = 0; k < kBlock; ++k) {
-        const float dx = c.x - x_[from + k], dy = c.y - y_[from + k], dz = c.z - z_[from + k];
-        const float height = std::max(0.f, -(dx * m.x + dy * m.y + dz * m.z));
-        const float cosine = std::max(0.f, dx * nx_[from + k] + dy * ny_[from + k] + dz * nz_[from + k]);
-        const float distance2 = std::max(kLeastDistance2, dx * dx + dy * dy + dz * dz);
-        const float root = static_cast<float>(static_cast<int>(seen[k])) * (1.f / 255);
-        const float weight = height * cosine * root * root / (distance2 * distance2);
+        const float weight = seen_share(seen[k]) * point_weight(c, m, from + k);
         red[to + k] += weight * flux.x;
         if constexpr (!kIsGrey) {
           green[to + k] += weight * flux.y;
@@ -311,14 +391,21 @@ void PointLinks::add_blocks(const std::vector<LitPatch>& lit, std::span<const Br
     }
     auto near = std::lower_bound(link.near_point.begin(), link.near_point.end(), static_cast<int>(base));
     for (; near != link.near_point.end() && *near < static_cast<int>(last_block * kBlock); ++near) {
-      const float* weight = &link.near_weight[static_cast<std::size_t>(near - link.near_point.begin()) * per_slot];
-      glm::vec3 sum(0);
-      for (std::size_t k = patch.first_bright; k < patch.last_bright; ++k)
-        sum += weight[bright[k].element % per_slot] * bright[k].radiosity;
-      const std::size_t to = static_cast<std::size_t>(*near) - base;
-      red[to] += sum.x;
-      green[to] += sum.y;
-      blue[to] += sum.z;
+      const auto number = static_cast<std::size_t>(near - link.near_point.begin()),
+                 to = static_cast<std::size_t>(*near) - base;
+      if (patch.is_even) {
+        const glm::vec3 received = link.near_sum[number] * patch.radiosity;
+        red[to] += received.x;
+        green[to] += received.y;
+        blue[to] += received.z;
+        continue;
+      }
+      const float* weight = &link.near_weight[number * per_slot];
+      red[to] += weighted_sum(weight, patch.sent[0]);
+      if constexpr (!kIsGrey) {
+        green[to] += weighted_sum(weight, patch.sent[1]);
+        blue[to] += weighted_sum(weight, patch.sent[2]);
+      }
     }
   }
   const std::size_t count = std::min(point_count_, last_block * kBlock) - base;
@@ -337,17 +424,15 @@ void PointLinks::add_irradiance(std::span<const BrightElement> bright, bool is_g
   std::vector<std::size_t> first{0};
   for (std::size_t k = 1; k <= bright.size(); ++k)
     if (k == bright.size() || bright[k].element / per_slot != bright[k - 1].element / per_slot) first.push_back(k);
-  parallel_indices(slots.size(), 16, [&](std::size_t k) {
-    lit[k] = lit_patch(bright, first[k], first[k + 1]);
-    lit[k].link = links[k];
-  });
+  parallel_indices(slots.size(), 16,
+                   [&](std::size_t k) { lit[k] = lit_patch(links[k], bright, first[k], first[k + 1]); });
 
   const std::size_t chunk_count = (x_.size() / kBlock + kBlocksAtOnce - 1) / kBlocksAtOnce;
   parallel_indices(chunk_count, 1, [&](std::size_t chunk) {
     if (is_grey)
-      add_blocks<true>(lit, bright, chunk, irradiance);
+      add_blocks<true>(lit, chunk, irradiance);
     else
-      add_blocks<false>(lit, bright, chunk, irradiance);
+      add_blocks<false>(lit, chunk, irradiance);
   });
 }
 

@@ -165,16 +165,19 @@ void RayScene::transmittance(std::span<const Ray> rays, std::span<float> shares,
     for (std::size_t k = 0; k < rest.size(); ++k) {
       const Hit& hit = hits[k];
       if (hit.face < 0) continue;
-      const Face& face = faces_.faces[hit.face];
       const float length = glm::length(rest[k].direction);
-      shares[index[k]] *= openings_[materials_[face.material].opening].transmittance_at(
-          glm::dot(face.normal, rest[k].direction) / length);
+      shares[index[k]] *= opening_transmittance(hit.face, rest[k].direction / length);
       rest[kept] = rest[k];
       rest[kept].t_near = hit.t * (1 + 4e-6f) + 0.1f * faces_.ray_offset() / length;
       index[kept++] = index[k];
     }
     rest.resize(kept);
   }
+}
+
+float RayScene::opening_transmittance(int face_index, glm::vec3 direction) const {
+  const Face& face = faces_.faces[static_cast<std::size_t>(face_index)];
+  return openings_[materials_[face.material].opening].transmittance_at(glm::dot(face.normal, direction));
 }
 
 float RayScene::transmittance(const Ray& ray) const {

@@ -56,7 +56,7 @@ class SolveOptions:
     node_opening_rays: int = 256
     panel_rays: int = 256
     node_tolerance: float = 0.06
-    tolerance: float = 1e-4
+    tolerance: float = 2.5e-4
     seed: int = 1
 
 
@@ -188,9 +188,9 @@ class Engine:
             raise InputError(str(error), file=self.scene.file, field=f"conditions.{condition.name}") from None
 
     def _core_condition(self, condition: Condition) -> _engine.Condition:
-        sky_picture = condition.environment_image(SKY_PICTURE_HEIGHT)
+        sky_picture = condition.environment_image(SKY_PICTURE_HEIGHT, single=True)
         core_condition = _engine.Condition(
-            condition.bin_luminance(self.sky_bins).astype(np.float32),
+            condition.fast_bin_luminance(self.sky_bins),
             _triple(condition.sky_rgb),
             _triple(condition.ground_luminance_rgb),
             np.ascontiguousarray(sky_picture, dtype=np.float32),

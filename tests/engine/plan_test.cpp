@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "rooms.h"
+#include "transom/beam_outlines.h"
+#include "transom/sampling.h"
 
 namespace transom {
 namespace {
@@ -98,6 +100,33 @@ TEST(Plan, OutlinesLoseNoLight) {
       EXPECT_EQ(few[i].element, many[i].element);
       EXPECT_EQ(few[i].illuminance, many[i].illuminance);
     }
+  }
+}
+
+TEST(Plan, OutlinesKnowWhatLightHasPassedAsRaysDo) {
+  // Two panes behind each other, and one aside; a beam that passes none, one or two of them.
+  SceneGeometry scene;
+  scene.materials = {{glm::vec3(0), glm::vec3(0), false, 0}};
+  scene.openings = {{std::vector<float>(2, 0.5f), 0.f}};
+  test::add_quad(scene, {0, 0, 1}, {2, 0, 1.5f}, {2, 2, 1.5f}, {0, 2, 1}, 0);
+  test::add_quad(scene, {1, 1, 3}, {1, 3, 3}, {3, 3, 3}, {3, 1, 3}, 0);
+  test::add_quad(scene, {4, 0, 1}, {6, 0, 1}, {6, 2, 3}, {4, 2, 3}, 0);
+  const Faces faces = make_faces(scene);
+  const RayScene rays(faces, scene.materials, scene.openings);
+  const SobolSequence sequence(3);
+  for (const glm::vec3 to_sun : {glm::vec3(0, 0, 1), glm::vec3(0.4f, 0.3f, 1), glm::vec3(-1, 0.2f, 0.3f)}) {
+    const BeamOutlines outlines(faces, {0, 1, 2}, to_sun);
+    int passed = 0;
+    for (std::uint32_t i = 0; i < 2000; ++i) {
+      const glm::vec4 u = sequence.point4(i);
+      const glm::vec3 point = glm::vec3(7 * u.x, 4 * u.y, 4 * u.z) - glm::vec3(faces.origin);
+      float share = 1;
+      for (int k = 0; k < 3; ++k)
+        if (outlines.is_before(k, outlines.along_beam(point))) share *= 0.5f;
+      EXPECT_NEAR(share, rays.transmittance({point, glm::normalize(to_sun)}), 1e-5f);
+      passed += share < 1;
+    }
+    EXPECT_GT(passed, 50);
   }
 }
 

@@ -92,6 +92,21 @@ TEST(PointLinks, PreparedBeforehandOrWhenNeededIsTheSame) {
   EXPECT_EQ(floor.by_links(early), floor.by_links(late));
 }
 
+TEST(PointLinks, AnEvenlyLitPatchIsTheLimitOfAnAlmostEvenOne) {
+  // The one is known beforehand, the other is found element by element and at the centroid of its light.
+  LitFloor even(true), uneven(true);
+  for (BrightElement& bright : even.bright) bright.radiosity = {120, 100, 50};
+  uneven.bright = even.bright;
+  for (std::size_t k = 0; k < uneven.bright.size(); k += 2) uneven.bright[k].radiosity *= 1.004f;
+  PointLinks links(*even.mesh, *even.rays, even.points);
+  const std::vector<glm::vec3> a = even.by_links(links), b = uneven.by_links(links);
+  float most = 0;
+  for (const glm::vec3& e : a) most = std::max(most, e.y);
+  for (std::size_t i = 0; i < a.size(); ++i)
+    for (int channel = 0; channel < 3; ++channel)
+      EXPECT_NEAR(b[i][channel], 1.002f * a[i][channel], 3e-3f * a[i][channel] + 1e-4f * most) << i;
+}
+
 TEST(PointLinks, ATableHidesTheFloorBelowIt) {
   LitFloor open, covered(true);
   open.points = covered.points = {{glm::vec3(2, 2, 1.01) - glm::vec3(open.faces.origin), {0, 0, -1}}};

@@ -89,6 +89,15 @@ def test_bin_means_converge_to_one_sky_whatever_the_bins() -> None:
     assert gathered == pytest.approx(flux, rel=3e-4)
 
 
+@pytest.mark.parametrize("sky", ["cie:1", "cie:12", "cie:15", "cie:16", "perez:700,90", "none"])
+def test_single_precision_gives_the_same_bins(sky: str) -> None:
+    condition = resolve_condition(ConditionSpec("a", "2026-03-21T10:00", sky), SITE)
+    bins = SkyBins(4)
+    fast = condition.fast_bin_luminance(bins)
+    assert fast.dtype == np.float32
+    assert fast == pytest.approx(condition.bin_luminance(bins), rel=1e-5)
+
+
 def test_bins_turn_with_the_sky() -> None:
     """A uniform overcast sky has equal means along each row, so the choice of the first bin's azimuth is free."""
     condition = resolve_condition(ConditionSpec("a", "2026-03-21T10:00", "cie:1"), SITE)

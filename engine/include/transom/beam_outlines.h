@@ -30,15 +30,37 @@ class BeamOutlines {
   /// may be named, none that covers something is left out.
   void covering(const BeamOutline& polygon, std::vector<int>& passages) const;
 
-  /// Whether any of those passages covers some of a polygon.
-  bool is_covered(const BeamOutline& polygon, const std::vector<int>& passages) const;
+  /// Whether passage k may cover some of a polygon, in the same sense.
+  bool covers(int k, const BeamOutline& polygon) const;
+
+  /// A point as seen along the beam: its place across it, and how far towards the source it is [m].
+  glm::vec3 along_beam(glm::vec3 point) const {
+    return {glm::dot(point, across_), glm::dot(point, along_), glm::dot(point, towards_)};
+  }
+
+  /// Whether what arrives at a point (as along_beam has it) has come through passage k, a planar one: exactly.
+  bool is_before(int k, glm::vec3 point) const {
+    const Passage& passage = passages_[static_cast<std::size_t>(k)];
+    if (point.x < passage.outline.low.x || point.x > passage.outline.high.x || point.y < passage.outline.low.y ||
+        point.y > passage.outline.high.y || passage.is_edge_on)
+      return false;
+    const glm::vec3 place(point.x, point.y, 1);
+    for (int edge = 0; edge < passage.outline.corner_count; ++edge)
+      if (glm::dot(passage.inwards[edge], place) < 0) return false;
+    return glm::dot(passage.depth, place) > point.z;
+  }
 
  private:
-  bool covers(const BeamOutline& passage, const BeamOutline& polygon) const;
+  struct Passage {
+    BeamOutline outline;
+    std::array<glm::vec3, 4> inwards{};  // of each edge: (a, b, c) with a x + b y + c >= 0 on its inner side
+    glm::vec3 depth{0};                  // the same, of how far towards the source its plane is
+    bool is_edge_on = false;
+  };
 
   glm::vec3 across_, along_, towards_;
   float margin_;
-  std::vector<BeamOutline> passages_;
+  std::vector<Passage> passages_;
 };
 
 }  // namespace transom

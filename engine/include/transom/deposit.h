@@ -71,9 +71,12 @@ class DirectLight {
   using Corners = std::array<glm::vec3, 4>;
   std::vector<glm::vec3> points_on(int slot, const Corners& corners, std::span<const int> elements, int samples,
                                    const Patterns& patterns) const;
-  std::vector<std::size_t> reached(glm::vec3 direction, const Receivers& receivers,
-                                   const std::vector<int>& openings) const;
-  std::vector<float> sample_sun(const Beam& sun, const Receivers& receivers, const std::vector<std::size_t>& candidates,
+  struct SunlitSlot;
+  class Sun;
+  std::vector<SunlitSlot> reached(const Sun& sun, const Receivers& receivers) const;
+  void sun_transmission(const Sun& sun, const SunlitSlot& slot, std::span<const glm::vec3> points,
+                        std::span<float> share) const;
+  std::vector<float> sample_sun(const Sun& sun, const Receivers& receivers, const std::vector<SunlitSlot>& candidates,
                                 const Patterns& patterns) const;
   std::vector<int> partly_lit(int slot, const std::vector<int>& place_of_slot, const std::vector<float>& share) const;
   void add_sun(const Beam& sun, const Receivers& receivers, const Patterns& patterns,
@@ -96,8 +99,8 @@ class DirectLight {
   const LightMesh& mesh_;
   const RayScene& rays_;
   std::vector<LocalSource> sources_;
-  std::vector<int> large_openings_, small_openings_;  // faces
-  std::vector<char> is_small_opening_;                // by face
+  std::vector<int> openings_, small_openings_;  // faces
+  std::vector<char> is_small_opening_;          // by face
 };
 
 }  // namespace transom

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "transom/classic.h"
+#include "transom/compact_rows.h"
 #include "transom/deposit.h"
 #include "transom/first_bounce.h"
 #include "transom/gather.h"
@@ -40,7 +41,7 @@ struct SolveOptions {
   GatherSamples node_samples{1024, 256};
   int panel_rays = 256;          ///< outwards from a panel, for each incident bin
   float node_tolerance = 0.06f;  ///< relative error of interpolated light from which on nodes are added; infinity: none
-  double tolerance = 1e-4;       ///< flux in flight at which interreflection stops, relative
+  double tolerance = 2.5e-4;     ///< flux in flight at which interreflection stops, relative
   std::uint32_t seed = 1;
   bool trace = false;
 };
@@ -170,6 +171,7 @@ class Engine {
   void mark_interior();
   void check_closed();
   void assemble_transfer(const Known& known);
+  void find_smooth_lights();
   struct TrialLight;
   struct NodeTrial;
   std::vector<TrialLight> trial_lights() const;
@@ -236,6 +238,8 @@ class Engine {
   std::shared_ptr<const SparseRows> form_factors_;
   SparseRows through_, patch_sky_;
   std::unique_ptr<Interreflection> interreflection_;
+  std::vector<std::vector<float>> smooth_lights_;  // radiosity of patches: first what the sky makes, if it is seen
+  bool has_sky_ = false;
 
   // Panels: products by opening; what arrives at each incident bin from the sky, and from elements or patches outdoors.
   std::vector<Product> products_;
@@ -246,6 +250,7 @@ class Engine {
   std::unique_ptr<NodeField> nodes_;
   std::shared_ptr<const NodeRows> node_rows_;
   SparseRows node_sky_, node_through_;  // all of the sky; patches seen through openings
+  CompactRows node_patches_;            // all that nodes see of patches
   SparseRows node_near_;  // what the nodes, then the patches, send close by: those with their weights, less these
   std::unique_ptr<PointLinks> links_;
 

@@ -1,38 +1,42 @@
 /// @file Interreflection prepared for many conditions: the solution of E = direct + (F + K) B, B = emitted + rho E.
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
+#include <span>
 #include <vector>
 
+#include "transom/compact_rows.h"
+#include "transom/patch_groups.h"
 #include "transom/transfer.h"
 
 namespace transom {
 
-/// Where a patch is: what tells which patches may be taken together.
-struct PatchPlace {
-  glm::vec3 position{0};
-  glm::vec3 normal{0};
-};
-
-/// What patches send out and receive of their own. is_grey: all of it is grey, and so are the reflectances.
+/// What patches send out and receive of their own.
 struct PatchLight {
   const std::vector<glm::vec3>& emitted;  ///< [lm/m²]
   const std::vector<glm::vec3>& direct;   ///< [lx]
-  bool is_grey = false;
+  bool is_grey = false;                   ///< all of it is grey, and so are the reflectances: one channel is computed
+  std::span<const int> bright{};          ///< patches that stand out from those around them; once each
 };
 
 /// A solver in three steps of precision. Each cycle reflects once between patches, exactly. What is left over after it
-/// is carried through all further reflections by a likeness of the exchange: its large form factors as they are, and
-/// all others with the patches of a cluster taken together, as dense rows. The likeness is solved in turn with the help
-/// of the clusters (a few hundred, by place and orientation), among which all reflections are a matrix found
-/// beforehand. What likeness and clusters get wrong is the next cycle's remainder: the answer is that of the patches.
-/// [after Hackbusch 1985, multigrid of the second kind]
+/// is carried through all further reflections by a likeness of the exchange, in which groups of patches stand for those
+/// that no smooth light tells apart. The likeness is solved in turn with the help of clusters (a few hundred, by place
+/// and orientation), among which all reflections are a matrix found beforehand. What likeness and clusters get wrong is
+/// the next cycle's remainder: the answer is that of the patches. [after Hackbusch 1985, multigrid of the second kind]
+///
+/// Light is smooth once it has been reflected. Where it falls from a beam it is not: bright patches send theirs for
+/// themselves, by the columns of the exchange.
 class Interreflection {
  public:
+  /// form_factors F, reciprocal, and through K (light through openings) are kept by reference.
   Interreflection(const SparseRows& form_factors, const SparseRows& through, std::vector<glm::vec3> reflectance,
                   std::vector<float> areas, const std::vector<PatchPlace>& places);
+
+  /// Makes the likeness coarse where smooth lights, such as these radiosities of patches, allow it. Until then it is
+  /// the exchange itself.
+  void prepare(std::span<const std::vector<float>> smooth_lights);
 
   /// Sees the irradiance after each cycle but the last; false ends the solution.
   using AfterCycle = std::function<bool(int cycle, const std::vector<glm::vec3>& irradiance)>;
@@ -48,29 +52,38 @@ class Interreflection {
   void set_reflectance(std::size_t patch, glm::vec3 reflectance) { reflectance_[patch] = reflectance; }
 
   int cluster_count() const { return cluster_count_; }
+  const PatchGroups& groups() const { return groups_; }
 
  private:
   void find_clusters(const std::vector<PatchPlace>& places);
   void find_operators();
-  void find_likeness();
-  template <bool kIsGrey>
-  void reflect_likeness(const std::vector<glm::vec4>& radiosity, const std::vector<glm::vec4>& mean,
-                        std::vector<glm::vec4>& irradiance) const;
-  void carry_on(const std::vector<glm::vec4>& left, bool is_grey, std::vector<glm::vec4>& radiosity) const;
-  void cluster_means(const std::vector<glm::vec4>& values, std::vector<glm::vec4>& means) const;
+  template <typename Value>
+  int solve_as(const PatchLight& light, double tolerance, int maximum_cycles, std::vector<glm::vec3>& irradiance,
+               const AfterCycle& after_cycle) const;
+  template <typename Value>
+  void begin(const PatchLight& light, std::vector<Value>& left, std::vector<Value>& radiosity) const;
+  template <typename Value>
+  double cycle(const PatchLight& light, std::vector<Value>& left, std::vector<Value>& radiosity,
+               std::vector<glm::vec3>& irradiance) const;
+  double measured_shrinking() const;
+  template <typename Value>
+  void carry_on(const std::vector<Value>& left, std::vector<Value>& radiosity) const;
+  template <typename Value>
+  void cluster_means(const std::vector<Value>& values, std::vector<Value>& means) const;
 
-  SparseRows exchange_;  // F + K
+  const SparseRows& form_factors_;
+  const SparseRows& through_;
+  SparseRows sent_through_;  // K by columns
   std::vector<glm::vec3> reflectance_;
   std::vector<float> areas_;
+  PatchGroups groups_;
+  CompactRows likeness_;           // of F + K, over patches and groups
+  double foretold_shrinking_ = 1;  // of what is left over, by a cycle after the first
   int cluster_count_ = 0;
   std::vector<int> cluster_of_;
   std::vector<float> cluster_area_;
   std::vector<glm::vec3> cluster_reflectance_;
-  SparseRows near_;                 // entries of the exchange that are large
-  std::size_t far_stride_ = 0;      // clusters, rounded up
-  std::vector<std::uint16_t> far_;  // all others, summed over clusters of senders; row by row
-  std::vector<float> far_scale_;    // what 1 of it stands for
-  std::vector<float> operator_;     // row by row: irradiance of clusters from what they have not yet reflected
+  std::vector<float> operator_;  // row by row: irradiance of clusters from what they have not yet reflected
 };
 
 }  // namespace transom

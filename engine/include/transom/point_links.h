@@ -18,7 +18,8 @@ namespace transom {
 /// patch has been linked: each link holds what stands between a point and a patch.
 ///
 /// A patch at least four diameters away counts as a point at the centroid of its light, seen as much as the middle of
-/// its exposed part is seen. Nearer points see each element for itself, with its own weight.
+/// its exposed part is seen; if it is evenly lit, all that is known beforehand. Nearer points see each element for
+/// itself, with its own weight.
 class PointLinks {
  public:
   PointLinks(const LightMesh& mesh, const RayScene& rays, const std::vector<Node>& points);
@@ -47,8 +48,13 @@ class PointLinks {
   struct Link {
     std::vector<int> block;          // blocks of points in front of the patch, ascending
     std::vector<std::uint8_t> seen;  // kBlock for each of them: of far points; 0 for near ones
+    // For each seen share: irradiance per radiosity where the light of the patch is even, in units of `weight_unit`.
+    std::vector<std::uint16_t> weight;
+    float weight_unit = 0;
     std::vector<int> near_point;     // ascending
     std::vector<float> near_weight;  // for each near point, by element: irradiance per radiosity
+    std::vector<float> near_sum;     // for each near point: the sum of these
+    std::vector<glm::vec4> element;  // of the patch: middle, lifted, and area
     std::vector<int> glazed_point;   // ascending: points between which and the patch some opening stands
     std::uint8_t seen_of(int point) const;
     const float* near_weight_of(int point, std::size_t element_count) const;  // null: not among the near points
@@ -60,9 +66,11 @@ class PointLinks {
   };
   struct LitPatch {
     std::shared_ptr<const Link> link;
-    std::size_t first_bright, last_bright;
-    glm::vec3 centroid, normal;  // of the light
-    glm::vec3 flux;              // reflected [lm], over pi
+    glm::vec3 centroid{0}, normal{0};  // of the light
+    glm::vec3 flux{0};                 // reflected [lm], over pi
+    bool is_even = true;               // all elements send the same
+    glm::vec3 radiosity{0};            // of each of them then
+    std::vector<float> sent[3];        // by element, for each channel: radiosity
   };
   std::size_t bytes_of(const Link& link) const;
   glm::vec3 exposed_middle(int slot) const;
@@ -71,9 +79,11 @@ class PointLinks {
   void link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points, const KnownPoints& known) const;
   void link_near(Link& link, int slot, const KnownPoints& known) const;
   template <bool kIsGrey>
-  void add_blocks(const std::vector<LitPatch>& lit, std::span<const BrightElement> bright, std::size_t chunk,
-                  std::vector<glm::vec3>& irradiance) const;
-  LitPatch lit_patch(std::span<const BrightElement> bright, std::size_t first, std::size_t last) const;
+  void add_blocks(const std::vector<LitPatch>& lit, std::size_t chunk, std::vector<glm::vec3>& irradiance) const;
+  float point_weight(glm::vec3 centre, glm::vec3 normal, std::size_t point) const;
+  void weigh_far(Link& link, int slot) const;
+  LitPatch lit_patch(std::shared_ptr<const Link> link, std::span<const BrightElement> bright, std::size_t first,
+                     std::size_t last) const;
 
   const LightMesh& mesh_;
   const RayScene& rays_;

@@ -53,6 +53,9 @@ class RayScene {
   void transmittance(std::span<const Ray> rays, std::span<float> shares, Order order = Order::kScattered) const;
   float transmittance(const Ray& ray) const;
 
+  /// Transmittance of the opening that a face belongs to, for light along `direction` or against it.
+  float opening_transmittance(int face, glm::vec3 direction) const;
+
   bool has_openings() const { return has_openings_; }
 
  private:

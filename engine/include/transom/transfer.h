@@ -31,8 +31,18 @@ struct SparseRows {
     for (std::size_t k = begin[row]; k < begin[row + 1]; ++k) sum += entries[k].weight * values[entries[k].index];
     return sum;
   }
-  /// The same for values of four floats: every fourth entry goes to the same of four sums, so that none waits for the
-  /// last, and these are added at the end.
+  /// The same for single floats and for values of four: every fourth entry goes to the same of four sums, so that none
+  /// waits for the last, and these are added at the end.
+  float dot(std::size_t row, const std::vector<float>& values) const {
+    float sums[4] = {0, 0, 0, 0};
+    const std::size_t end = begin[row + 1];
+    const auto term = [&](std::size_t i) { return entries[i].weight * values[entries[i].index]; };
+    std::size_t k = begin[row];
+    for (; k + 4 <= end; k += 4)
+      for (std::size_t lane = 0; lane < 4; ++lane) sums[lane] += term(k + lane);
+    for (std::size_t lane = 0; k < end; ++k, ++lane) sums[lane] += term(k);
+    return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+  }
   glm::vec4 dot(std::size_t row, const std::vector<glm::vec4>& values) const {
     const float* value = values.empty() ? nullptr : &values[0].x;
     __m128 sums[4] = {_mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps()};

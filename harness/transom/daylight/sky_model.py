@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 Float64 = NDArray[np.float64]
+Floats = NDArray[np.floating[Any]]
 Vector = tuple[float, float, float]
 
 QUADRATURE_ORDER = 64  # In each of two altitude panels and in azimuth: CIE skies to better than 1e-8.
@@ -26,8 +27,9 @@ class SkyPattern(Protocol):
     def depends_on_sun(self) -> bool:
         """Whether the luminance changes with the position of the sun."""
 
-    def relative_luminance(self, sin_altitude: Float64, cos_sun_angle: Float64) -> Float64:
-        """Relative luminance at altitudes above 0 and cosines of the angle from the sun (equal shapes in and out)."""
+    def relative_luminance(self, sin_altitude: Floats, cos_sun_angle: Floats) -> Floats:
+        """Relative luminance at altitudes above 0 and cosines of the angle from the sun (equal shapes and precision in
+        and out)."""
 
 
 @dataclass(frozen=True)
@@ -38,15 +40,25 @@ class SkyModel:
     sun_direction: Vector
     scale: float
 
-    def luminance(self, directions: Float64) -> Float64:
-        """Luminance [cd/m²] in unit directions (N, 3) -> (N,); 0 below the horizon."""
-        result = np.zeros(len(directions))
-        if self.scale != 0:
-            up = directions[:, 2] >= 0
-            seen = directions[up]
-            cos_sun_angle = seen @ np.array(self.sun_direction)
-            result[up] = self.scale * self.pattern.relative_luminance(seen[:, 2], cos_sun_angle)
+    def luminance(self, directions: Floats) -> Floats:
+        """Luminance [cd/m²] in unit directions (N, 3) -> (N,); 0 below the horizon.
+
+        In the precision of the directions: single is several times as fast, and errs by 1e-6 away from the sun, at its
+        centre by up to 1e-3.
+        """
+        if self.scale == 0:
+            return np.zeros(len(directions), dtype=directions.dtype)
+        is_up = directions[:, 2] >= 0
+        if is_up.all():
+            return self._luminance_above(directions)
+        result = np.zeros(len(directions), dtype=directions.dtype)
+        result[is_up] = self._luminance_above(directions[is_up])
         return result
+
+    def _luminance_above(self, directions: Floats) -> Floats:
+        cos_sun_angle = directions @ np.array(self.sun_direction, dtype=directions.dtype)
+        relative: Floats = self.pattern.relative_luminance(directions[:, 2], cos_sun_angle)
+        return self.scale * relative
 
     def horizontal_illuminance(self) -> float:
         """Illuminance of the unobstructed horizontal plane by the sky alone [lx]."""

@@ -1,0 +1,124 @@
+#include "transom/patch_groups.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <tuple>
+
+namespace transom {
+namespace {
+
+constexpr int kLargestGroup = 64;  // patches
+
+// 0 to 5: the axis, and its sense, that a normal is nearest to.
+int main_direction(glm::vec3 n) {
+  const glm::vec3 a = glm::abs(n);
+  const int axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
+  return 2 * axis + (n[axis] < 0);
+}
+
+}  // namespace
+
+PatchGroups::PatchGroups(const std::vector<PatchPlace>& places, const std::vector<float>& areas)
+    : order_(places.size()), parent_of_patch_(places.size(), -1) {
+  std::iota(order_.begin(), order_.end(), 0);
+  const auto kind = [&](int p) {
+    return std::tuple(places[static_cast<std::size_t>(p)].material,
+                      main_direction(places[static_cast<std::size_t>(p)].normal), p);
+  };
+  std::sort(order_.begin(), order_.end(), [&](int a, int b) { return kind(a) < kind(b); });
+  const auto is_other = [&](int a, int b) {
+    return std::get<0>(kind(a)) != std::get<0>(kind(b)) || std::get<1>(kind(a)) != std::get<1>(kind(b));
+  };
+  for (int first = 0, last; first < patch_count(); first = last) {
+    for (last = first + 1; last < patch_count() && !is_other(order_[first], order_[last]);) ++last;
+    if (last - first > 1) add_group(places, areas, first, last - first, -1);
+  }
+}
+
+// Halves the patches across the longer side of the box around them. Those above the largest size are not kept as
+// groups, but their halves are. Returns the number of what stands for all of them; -1: nothing does.
+int PatchGroups::add_group(const std::vector<PatchPlace>& places, const std::vector<float>& areas, int first, int count,
+                           int parent) {
+  if (count == 1) {
+    parent_of_patch_[order_[first]] = parent;
+    return order_[first];
+  }
+  const auto position = [&](int p) { return places[static_cast<std::size_t>(p)].position; };
+  glm::vec3 low = position(order_[first]), high = low;
+  for (int k = first; k < first + count; ++k) {
+    low = glm::min(low, position(order_[k]));
+    high = glm::max(high, position(order_[k]));
+  }
+  const glm::vec3 size = high - low;
+  const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+  const int half = count / 2;
+  std::nth_element(order_.begin() + first, order_.begin() + first + half, order_.begin() + first + count,
+                   [&](int a, int b) { return std::tuple(position(a)[axis], a) < std::tuple(position(b)[axis], b); });
+  const bool is_kept = count <= kLargestGroup;
+  const int own = is_kept ? group_count() : -1;
+  if (is_kept) groups_.push_back({parent, {-1, -1}, {0, 0}, first, count});
+  const int halves[2]{add_group(places, areas, first, half, own),
+                      add_group(places, areas, first + half, count - half, own)};
+  if (!is_kept) return -1;
+  const auto area = [&](int from, int to) {
+    float sum = 0;
+    for (int k = from; k < to; ++k) sum += areas[static_cast<std::size_t>(order_[k])];
+    return sum;
+  };
+  const float first_area = area(first, first + half), second_area = area(first + half, first + count);
+  const float share = first_area + second_area > 0 ? first_area / (first_area + second_area) : 0.5f;
+  for (int k = 0; k < 2; ++k) groups_[own].half[k] = halves[k];
+  groups_[own].share[0] = share;
+  groups_[own].share[1] = 1 - share;
+  return patch_count() + own;
+}
+
+PatchGroups::TypicalLight PatchGroups::typical(std::vector<float> radiosity) const {
+  TypicalLight light{std::move(radiosity), std::vector<float>(groups_.size(), 0.f)};
+  std::vector<float> means = light.radiosity;
+  append_means(means);
+  for (int g = 0; g < group_count(); ++g) {
+    float sum = 0;
+    for (int k = groups_[g].first; k < groups_[g].first + groups_[g].count; ++k) {
+      const float difference = light.radiosity[order_[k]] - means[patch_count() + g];
+      sum += difference * difference;
+    }
+    light.deviation[g] = std::sqrt(sum / static_cast<float>(groups_[g].count));
+  }
+  return light;
+}
+
+std::vector<Share> PatchGroups::grouped(const std::vector<Share>& row, const std::vector<TypicalLight>& lights,
+                                        const std::vector<float>& scales, float tolerance) const {
+  thread_local std::vector<float> weight;  // by group; 0 between calls
+  thread_local std::vector<int> touched;
+  weight.resize(std::max(weight.size(), groups_.size()), 0.f);
+  touched.clear();
+  for (const Share& share : row)
+    for (int g = parent_of_patch_[share.index]; g >= 0; g = groups_[g].parent) {
+      if (weight[g] == 0) touched.push_back(g);
+      weight[g] += share.weight;
+    }
+  const auto is_fine = [&](int g) {
+    for (std::size_t k = 0; k < lights.size(); ++k)
+      if (weight[g] * lights[k].deviation[g] > tolerance * scales[k]) return false;
+    return true;
+  };
+  std::vector<Share> result;
+  for (const Share& share : row) {
+    int chosen = -1;
+    for (int g = parent_of_patch_[share.index]; g >= 0; g = groups_[g].parent)
+      if (weight[g] < 0 || is_fine(g)) chosen = g;
+    if (chosen < 0) {
+      result.push_back(share);
+    } else if (weight[chosen] > 0) {
+      result.push_back({patch_count() + chosen, weight[chosen]});
+      weight[chosen] = -1;  // has been taken
+    }
+  }
+  for (const int g : touched) weight[g] = 0;
+  return result;
+}
+
+}  // namespace transom

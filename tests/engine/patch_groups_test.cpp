@@ -1,0 +1,153 @@
+#include "transom/patch_groups.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "transom/compact_rows.h"
+#include "transom/sampling.h"
+
+namespace transom {
+namespace {
+
+// 20 x 20 patches of a floor, of growing size, and as many of a ceiling.
+struct Floors {
+  std::vector<PatchPlace> places;
+  std::vector<float> areas;
+  PatchGroups groups;
+
+  Floors() {
+    for (int side = 0; side < 2; ++side)
+      for (int j = 0; j < 20; ++j)
+        for (int i = 0; i < 20; ++i) {
+          places.push_back({glm::vec3(i, j, 5 * side), glm::vec3(0, 0, side ? -1 : 1), side});
+          areas.push_back(1 + 0.1f * static_cast<float>(i));
+        }
+    groups = PatchGroups(places, areas);
+  }
+  // A radiosity that falls along the floor and is the same all over the ceiling.
+  std::vector<float> sloping() const {
+    std::vector<float> radiosity;
+    for (const PatchPlace& place : places) radiosity.push_back(place.material ? 50.f : 100 - 2 * place.position.x);
+    return radiosity;
+  }
+  std::vector<Share> even_row() const {
+    std::vector<Share> row;
+    for (int p = 0; p < groups.patch_count(); ++p) row.push_back({p, 1.f / 800});
+    return row;
+  }
+};
+
+TEST(PatchGroups, MeansAreByAreaAndOfOneMaterial) {
+  const Floors floors;
+  // Whatever the groups are: those of an even light have its value, and the extremes of a sloping one are not reached.
+  std::vector<glm::vec4> even(floors.places.size(), glm::vec4(3)), sloping;
+  floors.groups.append_means(even);
+  ASSERT_EQ(even.size(), static_cast<std::size_t>(floors.groups.patch_count() + floors.groups.group_count()));
+  for (const glm::vec4& value : even) EXPECT_FLOAT_EQ(value.x, 3);
+  for (const float value : floors.sloping()) sloping.push_back(glm::vec4(value));
+  floors.groups.append_means(sloping);
+  for (std::size_t g = floors.places.size(); g < sloping.size(); ++g)
+    EXPECT_TRUE(std::abs(sloping[g].x - 50) < 1e-4f || (sloping[g].x >= 62 && sloping[g].x <= 100)) << sloping[g].x;
+  EXPECT_GT(floors.groups.group_count(), 700);
+}
+
+TEST(PatchGroups, AGroupedRowKeepsItsSumAndIsAsGoodAsAsked) {
+  const Floors floors;
+  const std::vector<Share> row = floors.even_row();
+  std::vector<float> light = floors.sloping();
+  float received = 0;
+  for (const Share& share : row) received += share.weight * light[share.index];
+  const auto typical = floors.groups.typical(light);
+  std::vector<float> extended = light;
+  floors.groups.append_means(extended);
+  std::size_t before = row.size() + 1;
+  for (const float tolerance : {0.f, 1e-4f, 1e-3f, 1e-2f}) {
+    const std::vector<Share> grouped = floors.groups.grouped(row, {typical}, {received}, tolerance);
+    float sum = 0, found = 0;
+    for (const Share& share : grouped) {
+      sum += share.weight;
+      found += share.weight * extended[share.index];
+    }
+    EXPECT_NEAR(sum, 1, 1e-5f);
+    EXPECT_NEAR(found / received, 1, tolerance * static_cast<float>(grouped.size()) + 1e-5f);
+    EXPECT_LT(grouped.size(), before);
+    before = grouped.size();
+  }
+  EXPECT_LT(before, 60u);  // the ceiling is even: it is a few groups whatever the tolerance
+}
+
+TEST(PatchGroups, WithoutPatchesThereAreNoGroups) {
+  const PatchGroups none({}, {});
+  EXPECT_EQ(none.group_count(), 0);
+  EXPECT_TRUE(none.grouped({}, {}, {}, 1).empty());
+}
+
+// Rows of random length over many columns, and values for these.
+struct RandomRows {
+  SparseRows rows;
+  std::vector<glm::vec4> values;
+
+  explicit RandomRows(int column_count) {
+    const SobolSequence sequence(5);
+    std::uint32_t next = 0;
+    for (int r = 0; r < 50; ++r) {
+      std::vector<Share> row;
+      for (int k = 0; k < 3 * r; ++k) {
+        const glm::vec2 u = sequence.point2(next++);
+        row.push_back({static_cast<int>(u.x * static_cast<float>(column_count)), 1e-6f + u.y});
+      }
+      rows.append(row);
+    }
+    for (int c = 0; c < column_count; ++c)
+      values.push_back(glm::vec4(1e-7f * static_cast<float>(c + 1), 1e4f, 2.f + static_cast<float>(c % 5), 0));
+  }
+};
+
+TEST(CompactRows, FindWhatSparseRowsFindToTheirPrecision) {
+  for (const int columns : {7, 3000, 70000}) {
+    const RandomRows random(columns);
+    const CompactRows compact(random.rows);
+    const HalfColours halves(random.values);
+    ASSERT_EQ(compact.row_count(), random.rows.row_count());
+    for (std::size_t r = 0; r < compact.row_count(); ++r) {
+      const glm::vec4 expected = random.rows.dot(r, random.values);
+      const glm::vec3 found = compact.dot(r, halves);
+      for (int channel = 0; channel < 3; ++channel)
+        EXPECT_NEAR(found[channel], expected[channel], 0.016f * expected[channel]) << columns << " " << r;
+    }
+    // The roundings of a long row cancel each other, also of a value that all columns have.
+    if (columns > 7) {
+      EXPECT_NEAR(compact.dot(49, halves).y / random.rows.dot(49, random.values).y, 1, 1e-3);
+    }
+  }
+}
+
+TEST(CompactRows, GreyIsEachOfThreeEqualChannels) {
+  RandomRows random(500);
+  std::vector<float> greys;
+  for (glm::vec4& value : random.values) {
+    value = glm::vec4(glm::vec3(value.z), 0);
+    greys.push_back(value.x);
+  }
+  const CompactRows compact(random.rows);
+  for (std::size_t r = 0; r < compact.row_count(); ++r) {
+    const glm::vec3 colour = compact.dot(r, HalfColours(random.values));
+    EXPECT_FLOAT_EQ(compact.dot(r, HalfColours(greys)).x, colour.x);
+    EXPECT_EQ(compact.dot(r, HalfColours(random.values, true)), compact.dot(r, HalfColours(greys)));
+    EXPECT_EQ(colour.x, colour.z);
+  }
+}
+
+TEST(CompactRows, HalvesHaveTheRangeOfFloats) {
+  for (const float value : {0.f, 1.f, -2.5f, 1e-30f, 3e30f, 65504.f * 100})
+    for (const std::size_t number : {0u, 1u, 12345u})
+      EXPECT_NEAR(static_cast<float>(Half(value, number)), value, std::abs(value) / 128);
+  EXPECT_EQ(static_cast<float>(Half(1.f, 3)), 1.f);
+  double sum = 0;
+  for (std::size_t number = 0; number < 1000; ++number) sum += static_cast<float>(Half(1.001f, number));
+  EXPECT_NEAR(sum / 1000, 1.001, 1e-4);
+}
+
+}  // namespace
+}  // namespace transom
