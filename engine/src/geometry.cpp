@@ -6,10 +6,9 @@
 #include <numeric>
 #include <sstream>
 
-#include <oneapi/tbb/parallel_sort.h>
-
 #include "transom/error.h"
 #include "transom/face_pieces.h"
+#include "transom/parallel.h"
 
 namespace transom {
 namespace {
@@ -41,7 +40,7 @@ std::vector<int> weld_vertices(const std::vector<glm::dvec3>& vertices, double t
     places[i] = {static_cast<long long>(cell.x), static_cast<long long>(cell.y), static_cast<long long>(cell.z),
                  static_cast<int>(i)};
   }
-  oneapi::tbb::parallel_sort(places.begin(), places.end());
+  parallel_sort(places);
   std::vector<int> welded(vertices.size());
   for (std::size_t i = 0, first = 0; i < places.size(); ++i) {
     if (!places[i].is_near(places[first])) first = i;
@@ -75,7 +74,7 @@ std::vector<Edge> sorted_edges(const SceneGeometry& scene, const std::vector<int
       if (a != b) edges.push_back({std::min(a, b), std::max(a, b), static_cast<int>(f), a < b ? 1 : -1});
     }
   }
-  oneapi::tbb::parallel_sort(edges.begin(), edges.end());
+  parallel_sort(edges);
   return edges;
 }
 

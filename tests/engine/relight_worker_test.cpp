@@ -2,10 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <random>
+#include <thread>
 
 #include "rooms.h"
 #include "transom/error.h"
@@ -83,6 +87,69 @@ TEST(RelightWorker, CompleteStatesOfHoursInAnyOrderAreThoseOfAFreshRelighting) {
   EXPECT_GE(complete.size(), 5u);
   for (const RelightWorker::State& state : complete)
     expect_same(*state.lighting, *engine.relight(hour(hour_of.at(state.number))));
+}
+
+bool is_finite(glm::vec3 light) {
+  return std::isfinite(light.x) && std::isfinite(light.y) && std::isfinite(light.z);
+}
+
+TEST(RelightWorker, DrawsAndMeasuresWhileConditionsComeAsFastAsTheyCan) {
+  constexpr int kHours = 6, kBursts = 6, kConditionsPerBurst = 60;
+  const Engine engine(roof_light_room(0.6f, 0.8f), tregenza(), small_options());
+  std::vector<std::shared_ptr<const Lighting>> fresh;
+  for (int number = 0; number < kHours; ++number) fresh.push_back(engine.relight(hour(number)));
+  const Sensors sensors = engine.sensors({{1, 1, 0}, {2, 2, 0.8}, {3, 1, 0}}, {3, glm::vec3(0, 0, 1)}, {64, 64});
+  std::vector<RelightWorker::State> complete;
+  std::vector<int> wanted;
+  std::atomic<bool> is_over = false;
+  std::atomic<int> drawn = 0;
+  {
+    RelightWorker worker(engine, fresh[0]);
+    std::thread drawing([&] {
+      FrameRenderer renderer(engine);
+      std::uint64_t shown = 0;
+      while (!is_over) {
+        const RelightWorker::State state = worker.latest();
+        EXPECT_GE(state.number, shown);
+        shown = state.number;
+        for (const glm::vec3& pixel : renderer.render(into_the_room(), *state.lighting, {.edge_samples = 1}).radiance)
+          EXPECT_TRUE(is_finite(pixel));
+        for (const Irradiance& e : engine.illuminance(*state.lighting, sensors))
+          EXPECT_TRUE(is_finite(e.direct + e.sky + e.indirect));
+        ++drawn;
+      }
+    });
+    for (int burst = 0; burst < kBursts; ++burst) {
+      for (int i = 0; i < kConditionsPerBurst; ++i) worker.submit(hour(i % kHours));
+      wanted.push_back((burst + 1) % kHours);
+      worker.submit(hour(wanted.back()));
+      complete.push_back(worker.finished());
+      const int before = drawn;
+      while (drawn == before) std::this_thread::yield();
+    }
+    is_over = true;
+    drawing.join();
+  }
+  for (std::size_t burst = 0; burst < complete.size(); ++burst) {
+    EXPECT_EQ(complete[burst].number, (burst + 1) * (kConditionsPerBurst + 1));
+    expect_same(*complete[burst].lighting, *fresh[wanted[burst]]);
+  }
+}
+
+TEST(Relight, ThreadsThatAskOneEngineAtOnceGetTheAnswersOfOneAfterTheOther) {
+  for (const Method method : {Method::kGather, Method::kClassic}) {
+    const Engine engine(roof_light_room(0.6f), tregenza(), small_options(method)),
+        alone(roof_light_room(0.6f), tregenza(), small_options(method));
+    std::array<std::shared_ptr<const Lighting>, 3> answers;
+    std::vector<std::thread> threads;
+    for (int number = 1; number <= 3; ++number)
+      threads.emplace_back([&, number] { answers[number - 1] = engine.relight(hour(number)); });
+    std::optional<Engine> edited;
+    threads.emplace_back([&] { edited.emplace(engine, roof_light_room(0.5f)); });
+    for (std::thread& thread : threads) thread.join();
+    for (int number = 1; number <= 3; ++number) expect_same(*answers[number - 1], *alone.relight(hour(number)));
+    expect_same(*edited->relight(hour(1)), *Engine(alone, roof_light_room(0.5f)).relight(hour(1)));
+  }
 }
 
 // Keeps all states, and abandons the relighting after so many of them.

@@ -72,7 +72,7 @@ ENGINE_MAY_INCLUDE = {
     *("cstring", "exception", "functional", "initializer_list", "iomanip", "iterator", "limits", "map", "memory"),
     *("mutex", "new", "numbers", "numeric", "optional", "queue", "ranges", "set", "span", "sstream", "stdexcept"),
     *("string", "string_view", "thread", "tuple", "type_traits", "unordered_map", "unordered_set", "utility"),
-    *("variant", "vector", "dlfcn.h", "immintrin.h", "pmmintrin.h", "xmmintrin.h"),
+    *("variant", "vector", "dlfcn.h", "immintrin.h", "pmmintrin.h", "xmmintrin.h", "sanitizer/tsan_interface.h"),
 }
 ENGINE_MAY_INCLUDE_UNDER = ("Eigen/", "embree3/", "embree4/", "glad/", "glm/", "oneapi/tbb/", "tbb/")
 """With the standard headers above, all that the engine may know: no files, no Python, no calendar."""

@@ -1,37 +1,23 @@
 /// @file Parallel loops whose result does not depend on the number of threads: every index writes its own output.
 #pragma once
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-#include <pmmintrin.h>
-#include <xmmintrin.h>
-
+#include <algorithm>
 #include <cstddef>
+#include <vector>
 
 namespace transom {
 
-/// Flushes denormal numbers to zero in the calling thread while it lives, as Embree asks. The thread may be the
-/// caller's own: what it had is put back.
-class FlushDenormals {
- public:
-  FlushDenormals() : before_(_mm_getcsr()) {
-    _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);
-    _MM_SET_DENORMALS_ZERO_MODE(_MM_DENORMALS_ZERO_ON);
-  }
-  ~FlushDenormals() { _mm_setcsr(before_); }
-  FlushDenormals(const FlushDenormals&) = delete;
-  FlushDenormals& operator=(const FlushDenormals&) = delete;
-
- private:
-  unsigned before_;
-};
+/// Calls call(body, begin, end) for consecutive ranges of [0, count), at most `grain` or so indices each, with denormal
+/// numbers flushed to zero, as Embree asks. What the caller did comes before every range, and every range before the
+/// return; ranges come in any order, on any thread. Throws what a range throws.
+void run_ranges(std::size_t count, std::size_t grain, const void* body,
+                void (*call)(const void* body, std::size_t begin, std::size_t end));
 
 /// Calls body(begin, end) for consecutive ranges of [0, count), at most `grain` or so indices each.
 template <typename Body>
 void parallel_ranges(std::size_t count, std::size_t grain, const Body& body) {
-  oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, count, grain), [&](const auto& range) {
-    const FlushDenormals flush;
-    body(range.begin(), range.end());
+  run_ranges(count, grain, &body, [](const void* erased, std::size_t begin, std::size_t end) {
+    (*static_cast<const Body*>(erased))(begin, end);
   });
 }
 
@@ -41,6 +27,21 @@ void parallel_indices(std::size_t count, std::size_t grain, const Body& body) {
   parallel_ranges(count, grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) body(i);
   });
+}
+
+/// Sorts in ascending order. Values that compare equal must be equal: which of them comes first is not said.
+template <typename Value>
+void parallel_sort(std::vector<Value>& values) {
+  constexpr std::size_t kRunCount = 16;  // sorted each, then merged in pairs, in pairs of pairs and so on
+  const auto at = [&](std::size_t run) {
+    return values.begin() + values.size() * std::min(run, kRunCount) / kRunCount;
+  };
+  parallel_indices(kRunCount, 1, [&](std::size_t run) { std::sort(at(run), at(run + 1)); });
+  for (std::size_t merged = 1; merged < kRunCount; merged *= 2)
+    parallel_indices(kRunCount / (2 * merged), 1, [&](std::size_t pair) {
+      const std::size_t run = 2 * merged * pair;
+      std::inplace_merge(at(run), at(run + merged), at(run + 2 * merged));
+    });
 }
 
 }  // namespace transom
