@@ -133,7 +133,7 @@ std::vector<ForwardRays::Arrival> ForwardRays::panel_arrivals(const std::vector<
     if (!panel) continue;
     const PanelFrame& frame = panels_.frame(*panel);
     for (int bin = 0; bin < frame.bins.count(); ++bin) {
-      const glm::vec3 radiance = panel_radiance[static_cast<std::size_t>(panel->first_bin + bin)];
+      const glm::vec3 radiance = panel_radiance[panel->first_bin + bin];
       if (radiance == glm::vec3(0)) continue;
       const glm::vec3 flux = radiance * (t.area * frame.bins.projected_solid_angle(bin) / static_cast<float>(count));
       const SobolSequence points(hash_seed(seed_, hash_seed(kPanelStream + k, static_cast<std::uint64_t>(bin))));

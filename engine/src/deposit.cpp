@@ -197,7 +197,7 @@ std::vector<int> DirectLight::partly_lit(int slot_index, const std::vector<int>&
             edge = static_cast<int>(std::lround(std::sqrt(static_cast<float>(per_slot))));
   const auto sample = [&](int of_slot, int element, int i) {
     const int place = place_of_slot[of_slot];
-    return place < 0 ? 0.f : share[static_cast<std::size_t>((place * per_slot + element) * kSamplesPerElement + i)];
+    return place < 0 ? 0.f : share[(static_cast<std::size_t>(place) * per_slot + element) * kSamplesPerElement + i];
   };
   std::vector<int> found;
   for (int e = 0; e < per_slot; ++e) {

@@ -110,9 +110,9 @@ std::vector<std::size_t> DirectLight::reached_by_lobe(const Beam& lobe, const Re
   std::vector<std::size_t> found;
   for (std::size_t i = 0; i < receivers.slots.size() && !lobe.shafts->empty(); ++i) {
     if (mesh_.is_cluster(receivers.slots[i]) || glm::dot(lobe.direction_to_source, receivers.normals[i]) <= 0) continue;
-    const auto [low, high] = box_of(receivers.corners[i]);
+    const Box box = box_of(receivers.corners[i]);
     if (std::any_of(lobe.shafts->begin(), lobe.shafts->end(),
-                    [&](const LightShaft& shaft) { return shaft.may_meet(low, high); }))
+                    [&](const LightShaft& shaft) { return shaft.may_meet(box.low, box.high); }))
       found.push_back(i);
   }
   return found;

@@ -11,7 +11,6 @@ namespace transom {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
-constexpr int kMaximumCycles = 20000;
 constexpr int kShownCycle = 1;  // of interreflection: less than 1 % of the flux is still to come
 
 }  // namespace

@@ -79,7 +79,7 @@ FaceClusters::FaceClusters(const Faces& faces, const std::vector<char>& is_small
   if (sides_.empty()) return;
   element_of_side_.assign(2 * faces.faces.size(), 0);
   area_.resize(static_cast<std::size_t>(count()));
-  elements_.resize(static_cast<std::size_t>(count() * per_cluster_));
+  elements_.resize(static_cast<std::size_t>(count()) * per_cluster_);
   element_begin_.assign(elements_.size() + 1, sides_.size());
   area_before_.push_back(0);
   for (const int side : sides_) area_before_.push_back(area_before_.back() + faces.faces[side / 2].area);

@@ -116,6 +116,7 @@ std::vector<FacePiece> cut_faces(const SceneGeometry& scene, glm::dvec3 origin, 
   }
 
   std::vector<Box> boxes;
+  boxes.reserve(cutters.size());
   for (const Cutter& cutter : cutters) boxes.push_back(cutter.box);
   const BoxTree tree(std::move(boxes));
   std::vector<FacePiece> pieces;
