@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 namespace transom {
 namespace {
@@ -118,15 +119,15 @@ SectionProfile::Hit SectionProfile::nearest(glm::dvec2 place, glm::dvec2 along, 
     until = -1;
   }
   const double stride = along.x != 0 ? kStride * period_ / std::abs(along.x) : 1e300;
-  for (int k = 0; begin <= until; ++k, begin += stride) {
+  for (int k = 0; begin <= until; ++k) {
     if (k == kMaximumStrides) return {};
     const double end = std::min(begin + stride, until);
     const double y0 = place.x + begin * along.x, y1 = along.x != 0 ? place.x + end * along.x : place.x;
     for (const int line : others_) {
       const Shape& shape = shapes_[static_cast<std::size_t>(line)];
-      const double first = std::ceil((std::min(y0, y1) - shape.high_y) * per_metre_ - kClose);
-      const double last = std::floor((std::max(y0, y1) - shape.low_y) * per_metre_ + kClose);
-      for (double image = first; image <= last; ++image) {
+      const auto first = static_cast<std::int64_t>(std::ceil((std::min(y0, y1) - shape.high_y) * per_metre_ - kClose));
+      const auto last = static_cast<std::int64_t>(std::floor((std::max(y0, y1) - shape.low_y) * per_metre_ + kClose));
+      for (std::int64_t image = first; image <= last; ++image) {
         const bool starts_on_it = line == from && image == 0;
         if (shape.radius > 0)
           meet_arc(shape, place, along, close_, line, image * period_, starts_on_it, best);
@@ -135,6 +136,7 @@ SectionProfile::Hit SectionProfile::nearest(glm::dvec2 place, glm::dvec2 along, 
       }
     }
     if (best.t <= end) break;
+    begin += stride;
   }
   return best;
 }
@@ -159,9 +161,9 @@ bool SectionProfile::cuts(glm::dvec2 start, glm::dvec2 end, glm::dvec2 along, st
   const glm::dvec2 sideways = glm::dvec2(-along.y, along.x) / glm::length(along);
   for (const int line : others_) {
     const Shape& shape = shapes_[static_cast<std::size_t>(line)];
-    const double first = std::ceil((low - shape.high_y) / period_ - kClose);
-    const double last = std::floor((high - shape.low_y) / period_ + kClose);
-    for (double image = first; image <= last; ++image) {
+    const auto first = static_cast<std::int64_t>(std::ceil((low - shape.high_y) / period_ - kClose));
+    const auto last = static_cast<std::int64_t>(std::floor((high - shape.low_y) / period_ + kClose));
+    for (std::int64_t image = first; image <= last; ++image) {
       cut(shape.a, image * period_);
       cut(shape.b, image * period_);
       for (const double sign : {-1.0, 1.0}) {

@@ -185,6 +185,7 @@ std::vector<float> choose_edges(const Faces& faces, const std::vector<char>& is_
   const double edge = maximum_edge > 0 ? maximum_edge : std::sqrt(indoors / target_patch_count);
   const double outdoor_edge = std::max(edge, std::sqrt(outdoors / kOutdoorPatchCount));
   std::vector<float> edges;
+  edges.reserve(is_indoors.size());
   for (const char indoor : is_indoors)
     edges.push_back(static_cast<float>(indoor || indoors == 0 ? edge : outdoor_edge));
   return edges;
