@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <sstream>
 
 #include "embree_device.h"
@@ -99,10 +100,14 @@ UnitCellTracer::UnitCellTracer(UnitCell cell) : cell_(std::move(cell)), tree_(st
     for (std::size_t i = 0; i < 3; ++i) c[i] = cell_.corners[static_cast<std::size_t>(cell_.facets[k].corners[i])];
     const glm::dvec3 low = glm::min(c[0], glm::min(c[1], c[2])), high = glm::max(c[0], glm::max(c[1], c[2]));
     const glm::dvec3 normal = glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
-    const auto first = [&](double upper, double period) { return std::ceil((-slack - upper) / period); };
-    const auto last = [&](double lower, double period) { return std::floor((period + slack - lower) / period); };
-    for (double i = first(high.x, cell_.period_x); i <= last(low.x, cell_.period_x); ++i)
-      for (double j = first(high.y, cell_.period_y); j <= last(low.y, cell_.period_y); ++j) {
+    const auto first = [&](double upper, double period) {
+      return static_cast<std::int64_t>(std::ceil((-slack - upper) / period));
+    };
+    const auto last = [&](double lower, double period) {
+      return static_cast<std::int64_t>(std::floor((period + slack - lower) / period));
+    };
+    for (std::int64_t i = first(high.x, cell_.period_x); i <= last(low.x, cell_.period_x); ++i)
+      for (std::int64_t j = first(high.y, cell_.period_y); j <= last(low.y, cell_.period_y); ++j) {
         const glm::dvec3 shift(i * cell_.period_x, j * cell_.period_y, 0);
         tree_->triangles.push_back({static_cast<int>(k), c[0] + shift, normal});
         for (const glm::dvec3 corner : c) corners.push_back((corner + shift) * tree_->scale);
@@ -244,7 +249,7 @@ void UnitCellTracer::Run::meet_facet(const Path& path, int triangle, std::vector
     branch.direction = way.direction;
     branch.reference = way.reference;
     branch.light = way.light;
-    branch.history = hash_seed(next.history, static_cast<std::uint64_t>(k + 4 * triangle));
+    branch.history = hash_seed(next.history, static_cast<std::uint64_t>(k) + 4 * static_cast<std::uint64_t>(triangle));
     if (way.is_diffuse) {
       const glm::vec4 first = sobol_.point4(path.number);
       const double u = path.is_scattered ? branch.chance() : static_cast<double>(first.z);
