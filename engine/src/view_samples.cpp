@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <utility>
 
 #include "transom/parallel.h"
 
@@ -12,6 +14,7 @@ namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr int kMaximumCrossings = 16;   // openings looked through, one behind another
 constexpr float kSameNormal = 0.9995f;  // cosine between normals of one smooth or flat surface
+constexpr int kFiner = 2;               // times as many samples an axis say how much of a pixel a surface covers
 
 // A surface at the end of a ray from the camera, or a pane on the way.
 struct Seen {
@@ -94,6 +97,59 @@ BeamPoint beam_point(const Engine& engine, const Seen& seen, float weight, int p
           sample};
 }
 
+// Names what a ray has met: a side of a face, the sky or the ground, and how many openings are in front of it.
+std::int64_t name_of(const Seen& seen) {
+  const std::int64_t surface = seen.hit.face >= 0 ? 2 * std::int64_t{seen.hit.face} + seen.hit.side + 2
+                                                  : (seen.direction.z < 0 ? 1 : 0);
+  return surface * (kMaximumCrossings + 2) + seen.crossings;
+}
+
+// A sample of a pixel and its share of it.
+struct Weighed {
+  Seen seen;
+  int sample;
+  float weight;
+};
+
+// The samples of a pixel, weighed so that all that it sees has the share that a finer grid finds of it. What only the
+// finer grid has met is one more sample, at the place of the coarser grid that it lies at.
+void weigh(const std::vector<Seen>& coarse, const std::vector<Seen>& fine, int samples_per_axis,
+           std::vector<Weighed>& weighed) {
+  weighed.clear();
+  std::vector<std::pair<std::int64_t, int>> count;  // of the finer grid, by what is met
+  const auto count_of = [&](std::int64_t name) {
+    return std::find_if(count.begin(), count.end(), [&](const auto& entry) { return entry.first == name; });
+  };
+  for (const Seen& seen : fine) {
+    const auto known = count_of(name_of(seen));
+    if (known == count.end())
+      count.emplace_back(name_of(seen), 1);
+    else
+      ++known->second;
+  }
+  const float part = 1 / static_cast<float>(fine.size());
+  for (std::size_t k = 0; k < coarse.size(); ++k) {
+    const std::int64_t name = name_of(coarse[k]);
+    const auto found = count_of(name);
+    if (found == count.end()) continue;
+    const auto like_it =
+        std::count_if(coarse.begin(), coarse.end(), [&](const Seen& other) { return name_of(other) == name; });
+    weighed.push_back({coarse[k], static_cast<int>(k),
+                       part * static_cast<float>(found->second) / static_cast<float>(like_it)});
+  }
+  for (std::size_t k = 0; k < fine.size(); ++k) {
+    const std::int64_t name = name_of(fine[k]);
+    const auto found = count_of(name);
+    if (found->second == 0 ||
+        std::any_of(coarse.begin(), coarse.end(), [&](const Seen& other) { return name_of(other) == name; }))
+      continue;
+    const int finer = kFiner * samples_per_axis, column = static_cast<int>(k) % finer / kFiner,
+              row = static_cast<int>(k) / finer / kFiner;
+    weighed.push_back({fine[k], row * samples_per_axis + column, part * static_cast<float>(found->second)});
+    found->second = 0;
+  }
+}
+
 // What one row of the picture found, in the order of its pixels.
 struct RowOfPixels {
   std::vector<BeamPoint> fine, on_panes;
@@ -159,6 +215,7 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
   const float same_plane = 1e-4f * engine.faces().extent;
   const auto differ = [&](const Seen& a, const Seen& b) {
     if (a.crossings != b.crossings || (a.hit.face < 0) != (b.hit.face < 0)) return true;
+    if (a.hit.face < 0) return (a.direction.z < 0) != (b.direction.z < 0);
     if (a.hit.face == b.hit.face) return a.hit.side != b.hit.side;
     const Face &f = engine.faces().faces[a.hit.face], &g = engine.faces().faces[b.hit.face];
     const float cosine = glm::dot(f.normal, g.normal) * (a.hit.side == b.hit.side ? 1.f : -1.f);
@@ -184,25 +241,36 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
     RowOfPixels& row = rows[y];
     row.smooth.resize(row_size);
     Tracer tracer(engine, view);
-    std::vector<glm::vec2> points(static_cast<std::size_t>(s * s));
-    std::vector<Seen> found;
-    std::vector<SeenPane> found_panes;
+    std::vector<glm::vec2> points;
+    std::vector<Seen> found, finer;
+    std::vector<SeenPane> panes_found, finer_panes;
+    std::vector<Weighed> weighed;
+    const auto trace_grid = [&](std::size_t x, int of_axis, std::vector<Seen>& met, std::vector<SeenPane>& panes_met) {
+      points.clear();
+      for (int k = 0; k < of_axis * of_axis; ++k) points.push_back(glm::vec2(x, y) + sample_place(k, of_axis));
+      tracer.trace(points, met, panes_met);
+    };
     for (std::size_t x = 0; x < row_size; ++x) {
       const std::size_t p = y * row_size + x;
       const int pixel = static_cast<int>(p);
+      if (has_edge[p]) {  // beside the pixel, or in it
+        trace_grid(x, s, found, panes_found);
+        has_edge[p] = std::any_of(found.begin(), found.end(), [&](const Seen& other) { return differ(seen[p], other); });
+      }
       if (!has_edge[p]) {
         centre[p] = add_sample(engine, seen[p], 1, pixel, -1, row.smooth[x], row);
         continue;
       }
       centre[p] = beam_point(engine, seen[p], 1, pixel, -1);
-      for (int k = 0; k < s * s; ++k) points[k] = glm::vec2(x, y) + sample_place(k, s);
-      tracer.trace(points, found, found_panes);
-      const float weight = 1 / static_cast<float>(s * s);
-      for (int k = 0; k < s * s; ++k) {
-        const BeamPoint point = add_sample(engine, found[k], weight, pixel, k, row.smooth[x], row);
+      trace_grid(x, kFiner * s, finer, finer_panes);
+      weigh(found, finer, s, weighed);
+      for (const Weighed& sample : weighed) {
+        const BeamPoint point =
+            add_sample(engine, sample.seen, sample.weight, pixel, sample.sample, row.smooth[x], row);
         if (point.surface >= 0) row.fine.push_back(point);
       }
-      for (const SeenPane& pane : found_panes)
+      const float weight = 1 / static_cast<float>(s * s);
+      for (const SeenPane& pane : panes_found)
         row.on_panes.push_back(
             add_sample(engine, pane.seen, weight, pixel, static_cast<int>(pane.ray), row.smooth[x], row));
     }
