@@ -14,7 +14,6 @@ namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr int kMaximumCrossings = 16;   // openings looked through, one behind another
 constexpr float kSameNormal = 0.9995f;  // cosine between normals of one smooth or flat surface
-constexpr int kFiner = 2;               // times as many samples an axis say how much of a pixel a surface covers
 
 // A surface at the end of a ray from the camera, or a pane on the way.
 struct Seen {
@@ -104,55 +103,80 @@ std::int64_t name_of(const Seen& seen) {
   return surface * (kMaximumCrossings + 2) + seen.crossings;
 }
 
-// A sample of a pixel and its share of it.
-struct Weighed {
+// A sample of a pixel.
+struct Sample {
   Seen seen;
-  int sample;
-  float weight;
+  int place;  // BeamPoint::sample
 };
 
-// The samples of a pixel, weighed so that all that it sees has the share that a finer grid finds of it. What only the
-// finer grid has met is one more sample, at the place of the coarser grid that it lies at.
-void weigh(const std::vector<Seen>& coarse, const std::vector<Seen>& fine, int samples_per_axis,
-           std::vector<Weighed>& weighed) {
-  weighed.clear();
-  std::vector<std::pair<std::int64_t, int>> count;  // of the finer grid, by what is met
-  const auto count_of = [&](std::int64_t name) {
-    return std::find_if(count.begin(), count.end(), [&](const auto& entry) { return entry.first == name; });
-  };
-  for (const Seen& seen : fine) {
-    const auto known = count_of(name_of(seen));
-    if (known == count.end())
-      count.emplace_back(name_of(seen), 1);
-    else
-      ++known->second;
+// All that is alike of what a pixel sees.
+struct PartOfPixel {
+  std::vector<Sample> samples;
+  std::vector<int> places;  // of the finer grid, at which it is seen
+};
+
+// Tells apart what the samples of a pixel see, by two grids: each part has the samples of the coarser one, or of the
+// finer one where the coarser has missed it, and covers as much of the pixel as the finer one says.
+class PixelParts {
+ public:
+  explicit PixelParts(int samples_per_axis) : s_(samples_per_axis) {}
+
+  const std::vector<PartOfPixel>& tell_apart(const std::vector<Seen>& coarse, const std::vector<Seen>& finer) {
+    parts_.clear();
+    names_.clear();
+    part_at_.clear();
+    for (std::size_t k = 0; k < finer.size(); ++k) {
+      const std::size_t part = part_of(name_of(finer[k]));
+      if (part == parts_.size()) {
+        names_.push_back(name_of(finer[k]));
+        parts_.emplace_back();
+      }
+      parts_[part].places.push_back(static_cast<int>(k));
+      part_at_.push_back(part);
+    }
+    for (std::size_t k = 0; k < coarse.size(); ++k) {
+      const std::size_t part = part_of(name_of(coarse[k]));
+      if (part < parts_.size()) parts_[part].samples.push_back({coarse[k], place_in_masks(part, static_cast<int>(k))});
+    }
+    for (std::size_t part = 0; part < parts_.size(); ++part)
+      if (parts_[part].samples.empty())
+        parts_[part].samples.push_back({finer[static_cast<std::size_t>(parts_[part].places.front())],
+                                        place_in_masks(part, 0)});
+    return parts_;
   }
-  const float part = 1 / static_cast<float>(fine.size());
-  for (std::size_t k = 0; k < coarse.size(); ++k) {
-    const std::int64_t name = name_of(coarse[k]);
-    const auto found = count_of(name);
-    if (found == count.end()) continue;
-    const auto like_it =
-        std::count_if(coarse.begin(), coarse.end(), [&](const Seen& other) { return name_of(other) == name; });
-    weighed.push_back({coarse[k], static_cast<int>(k),
-                       part * static_cast<float>(found->second) / static_cast<float>(like_it)});
+
+ private:
+  std::size_t part_of(std::int64_t name) const {
+    return static_cast<std::size_t>(std::find(names_.begin(), names_.end(), name) - names_.begin());
   }
-  for (std::size_t k = 0; k < fine.size(); ++k) {
-    const std::int64_t name = name_of(fine[k]);
-    const auto found = count_of(name);
-    if (found->second == 0 ||
-        std::any_of(coarse.begin(), coarse.end(), [&](const Seen& other) { return name_of(other) == name; }))
-      continue;
-    const int finer = kFiner * samples_per_axis, column = static_cast<int>(k) % finer / kFiner,
-              row = static_cast<int>(k) / finer / kFiner;
-    weighed.push_back({fine[k], row * samples_per_axis + column, part * static_cast<float>(found->second)});
-    found->second = 0;
+  // A place of the coarser grid around which only this part is seen, so that the middle of its square, where masks are
+  // drawn, sees it too: the own one, or another.
+  int place_in_masks(std::size_t part, int own) const {
+    const auto is_whole = [&](int place) {
+      for (int j = 0; j < kFiner; ++j)
+        for (int i = 0; i < kFiner; ++i)
+          if (part_at_[static_cast<std::size_t>((place / s_ * kFiner + j) * kFiner * s_ + place % s_ * kFiner + i)] !=
+              part)
+            return false;
+      return true;
+    };
+    if (is_whole(own)) return own;
+    for (int place = 0; place < s_ * s_; ++place)
+      if (is_whole(place)) return place;
+    return BeamPoint::kNotInMasks;
   }
-}
+
+  int s_;
+  std::vector<std::int64_t> names_;
+  std::vector<PartOfPixel> parts_;
+  std::vector<std::size_t> part_at_;  // by place of the finer grid
+};
 
 // What one row of the picture found, in the order of its pixels.
 struct RowOfPixels {
   std::vector<BeamPoint> fine, on_panes;
+  std::vector<ViewSamples::Part> parts;
+  std::vector<int> places;
   std::vector<std::vector<Share>> smooth;
   std::vector<ViewSamples::Constant> constant;
   std::vector<ViewSamples::Outlook> outlooks;
@@ -244,7 +268,7 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
     std::vector<glm::vec2> points;
     std::vector<Seen> found, finer;
     std::vector<SeenPane> panes_found, finer_panes;
-    std::vector<Weighed> weighed;
+    PixelParts pixel_parts(s);
     const auto trace_grid = [&](std::size_t x, int of_axis, std::vector<Seen>& met, std::vector<SeenPane>& panes_met) {
       points.clear();
       for (int k = 0; k < of_axis * of_axis; ++k) points.push_back(glm::vec2(x, y) + sample_place(k, of_axis));
@@ -263,11 +287,17 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
       }
       centre[p] = beam_point(engine, seen[p], 1, pixel, -1);
       trace_grid(x, kFiner * s, finer, finer_panes);
-      weigh(found, finer, s, weighed);
-      for (const Weighed& sample : weighed) {
-        const BeamPoint point =
-            add_sample(engine, sample.seen, sample.weight, pixel, sample.sample, row.smooth[x], row);
-        if (point.surface >= 0) row.fine.push_back(point);
+      for (const PartOfPixel& part : pixel_parts.tell_apart(found, finer)) {
+        const float share = static_cast<float>(part.places.size()) / static_cast<float>(finer.size()),
+                    weight = share / static_cast<float>(part.samples.size());
+        const std::size_t first_point = row.fine.size();
+        for (const Sample& sample : part.samples) {
+          const BeamPoint point = add_sample(engine, sample.seen, weight, pixel, sample.place, row.smooth[x], row);
+          if (point.surface >= 0) row.fine.push_back(point);
+        }
+        if (row.fine.size() == first_point) continue;
+        row.parts.push_back({first_point, row.fine.size(), row.places.size(), row.places.size() + part.places.size()});
+        row.places.insert(row.places.end(), part.places.begin(), part.places.end());
       }
       const float weight = 1 / static_cast<float>(s * s);
       for (const SeenPane& pane : panes_found)
@@ -286,6 +316,10 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
   smooth.entries.reserve(share_count);
   smooth.begin.reserve(pixel_count + 1);
   for (const RowOfPixels& row : rows) {
+    for (const Part& part : row.parts)
+      parts.push_back({part.first_point + fine.size(), part.last_point + fine.size(), part.first_place + places.size(),
+                       part.last_place + places.size()});
+    places.insert(places.end(), row.places.begin(), row.places.end());
     fine.insert(fine.end(), row.fine.begin(), row.fine.end());
     on_panes.insert(on_panes.end(), row.on_panes.begin(), row.on_panes.end());
     constant.insert(constant.end(), row.constant.begin(), row.constant.end());
