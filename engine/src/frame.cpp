@@ -14,6 +14,14 @@ namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr std::size_t kBlock = 256;  // pixels or points at once
 constexpr float kSameShare = 0.02f;  // of a beam, between neighbouring pixels without an edge
+constexpr float kSameCurve = 0.9f;   // cosine between normals of neighbouring pixels on one surface
+
+// Whether a point is on the surface of another one, flat or curved.
+bool is_continued(const BeamPoint& a, const BeamPoint& b) {
+  if (b.surface < 0 || glm::dot(a.normal, b.normal) < kSameCurve) return false;
+  const glm::vec3 between = b.position - a.position;
+  return std::abs(glm::dot(between, a.normal)) < (1 - kSameCurve) * glm::length(between);
+}
 
 }  // namespace
 
@@ -114,18 +122,21 @@ void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const
            engine_.reflectance(point.surface / 2, point.surface % 2) * beam.normal_illuminance;
   };
 
-  // Pixels on one surface: the centre speaks for them, unless neighbours are lit otherwise. Then all samples are tested
-  // on the plane of the centre.
+  // Pixels on one surface: one point speaks for them, unless neighbours are lit otherwise. Then all samples are tested
+  // on its plane.
   const CameraRays camera(samples.view);
   const glm::vec3 eye(samples.view.position - engine_.faces().origin);
-  // Another sample of a point's pixel, on the plane of the point.
   const auto on_plane = [&](BeamPoint point, int sample, int samples_per_axis) {
     const glm::vec2 corner(point.pixel % width, point.pixel / width);
-    const glm::vec3 direction = camera.direction(corner + sample_place(sample, samples_per_axis)),
-                    normal = engine_.faces().faces[point.surface / 2].normal;
-    point.position = eye + direction * (glm::dot(point.position - eye, normal) / glm::dot(direction, normal));
+    point.position = place_on_plane(camera, eye, corner + sample_place(sample, samples_per_axis), point.position,
+                                    engine_.faces().faces[point.surface / 2].normal);
     point.sample = sample;
     return point;
+  };
+  const auto for_neighbours = [&](int pixel, const auto& visit) {
+    const int x = pixel % width, y = pixel / width;
+    for (int j = std::max(y - 1, 0); j <= std::min(y + 1, height - 1); ++j)
+      for (int i = std::max(x - 1, 0); i <= std::min(x + 1, width - 1); ++i) visit(j * width + i);
   };
   parallel_indices(static_cast<std::size_t>(height), 1, [&](std::size_t row) {
     std::vector<BeamPoint> points;
@@ -141,10 +152,7 @@ void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const
       if (samples.has_edge[pixel] || centre.surface < 0) continue;
       bool edge = false;
       if (s > 1) {
-        for (int dy = -1; dy <= 1; ++dy)
-          for (int dx = -1; dx <= 1; ++dx)
-            if (x + dx >= 0 && x + dx < width && y + dy >= 0 && y + dy < height)
-              edge |= std::abs(share[pixel] - share[pixel + dy * width + dx]) > kSameShare;
+        for_neighbours(pixel, [&](int other) { edge |= std::abs(share[pixel] - share[other]) > kSameShare; });
         if (mask_share && !edge)
           for (int k = 0; k < s * s; ++k)
             edge |= (*mask_share)[masks.index(pixel, k)] != (*mask_share)[masks.index(pixel, -1)];
@@ -157,12 +165,13 @@ void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const
       for (int k = 0; k < s * s; ++k) points.push_back(on_plane(centre, k, s));
     }
     shares.resize(points.size());
-    find_shares(beam, points, mask_share, masks, shares);
+    find_shares(beam, points, nullptr, masks, shares);
     for (std::size_t k = 0; k < points.size(); ++k)
       if (shares[k] > 0) picture[points[k].pixel] += reflected(points[k], shares[k] / static_cast<float>(s * s));
   });
 
   // Pixels with an edge of a surface: every sample for itself, unless a beam ends within what is seen of a surface.
+  const std::vector<float> centre_share = share;
   find_shares_by_block(beam, samples.fine, fine_boxes_, mask_share, masks, share);
   const int finer = kFiner * s;
   parallel_ranges(samples.parts.size(), kBlock, [&](std::size_t begin, std::size_t end) {
@@ -170,11 +179,17 @@ void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const
     std::vector<float> shares;
     for (std::size_t i = begin; i < end; ++i) {
       const ViewSamples::Part& part = samples.parts[i];
-      const auto [least, most] = std::minmax_element(&share[part.first_point], &share[part.last_point - 1] + 1);
-      if (*most - *least <= kSameShare) continue;
+      const BeamPoint& first = samples.fine[part.first_point];
+      const float of_first = share[part.first_point];
+      const auto is_other = [&](float other) { return std::abs(other - of_first) > kSameShare; };
+      bool ends = std::any_of(&share[part.first_point], &share[part.last_point - 1] + 1, is_other);
+      for_neighbours(first.pixel, [&](int other) {
+        ends |= is_other(centre_share[other]) && is_continued(first, samples.centre[other]);
+      });
+      if (!ends) continue;
       points.clear();
       for (std::size_t k = part.first_place; k < part.last_place; ++k)
-        points.push_back(on_plane(samples.fine[part.first_point], samples.places[k], finer));
+        points.push_back(on_plane(first, samples.places[k], finer));
       shares.resize(points.size());
       find_shares(beam, points, nullptr, masks, shares);
       std::fill(&share[part.first_point], &share[part.last_point - 1] + 1,

@@ -98,8 +98,8 @@ BeamPoint beam_point(const Engine& engine, const Seen& seen, float weight, int p
 
 // Names what a ray has met: a side of a face, the sky or the ground, and how many openings are in front of it.
 std::int64_t name_of(const Seen& seen) {
-  const std::int64_t surface = seen.hit.face >= 0 ? 2 * std::int64_t{seen.hit.face} + seen.hit.side + 2
-                                                  : (seen.direction.z < 0 ? 1 : 0);
+  const std::int64_t surface =
+      seen.hit.face >= 0 ? 2 * std::int64_t{seen.hit.face} + seen.hit.side + 2 : (seen.direction.z < 0 ? 1 : 0);
   return surface * (kMaximumCrossings + 2) + seen.crossings;
 }
 
@@ -140,8 +140,8 @@ class PixelParts {
     }
     for (std::size_t part = 0; part < parts_.size(); ++part)
       if (parts_[part].samples.empty())
-        parts_[part].samples.push_back({finer[static_cast<std::size_t>(parts_[part].places.front())],
-                                        place_in_masks(part, 0)});
+        parts_[part].samples.push_back(
+            {finer[static_cast<std::size_t>(parts_[part].places.front())], place_in_masks(part, 0)});
     return parts_;
   }
 
@@ -219,6 +219,17 @@ glm::vec2 sample_place(int sample, int samples_per_axis) {
   return {within(column, row), within(row, samples_per_axis - 1 - column)};
 }
 
+glm::vec2 scattered_place(int x, int y) {
+  constexpr int kPeriod = 3;
+  return sample_place(x % kPeriod * kPeriod + y % kPeriod, kPeriod);
+}
+
+glm::vec3 place_on_plane(const CameraRays& camera, glm::vec3 eye, glm::vec2 pixel, glm::vec3 of_plane,
+                         glm::vec3 normal) {
+  const glm::vec3 direction = camera.direction(pixel);
+  return eye + direction * (glm::dot(of_plane - eye, normal) / glm::dot(direction, normal));
+}
+
 ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_per_axis)
     : view(camera), edge_samples(std::max(1, samples_per_axis)) {
   const int width = view.width, height = view.height, s = edge_samples;
@@ -259,6 +270,8 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
     });
 
   // Samples, row by row of the picture.
+  const CameraRays camera_rays(view);
+  const glm::vec3 eye(view.position - engine.faces().origin);
   centre.resize(pixel_count);
   std::vector<RowOfPixels> rows(row_count);
   parallel_indices(row_count, 1, [&](std::size_t y) {
@@ -279,13 +292,18 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
       const int pixel = static_cast<int>(p);
       if (has_edge[p]) {  // beside the pixel, or in it
         trace_grid(x, s, found, panes_found);
-        has_edge[p] = std::any_of(found.begin(), found.end(), [&](const Seen& other) { return differ(seen[p], other); });
+        has_edge[p] =
+            std::any_of(found.begin(), found.end(), [&](const Seen& other) { return differ(seen[p], other); });
       }
       if (!has_edge[p]) {
-        centre[p] = add_sample(engine, seen[p], 1, pixel, -1, row.smooth[x], row);
+        centre[p] = add_sample(engine, seen[p], 1, pixel, BeamPoint::kCentre, row.smooth[x], row);
+        if (s > 1 && centre[p].surface >= 0)
+          centre[p].position = place_on_plane(
+              camera_rays, eye, glm::vec2(x, y) + scattered_place(static_cast<int>(x), static_cast<int>(y)),
+              centre[p].position, engine.faces().faces[seen[p].hit.face].normal);
         continue;
       }
-      centre[p] = beam_point(engine, seen[p], 1, pixel, -1);
+      centre[p] = beam_point(engine, seen[p], 1, pixel, BeamPoint::kCentre);
       trace_grid(x, kFiner * s, finer, finer_panes);
       for (const PartOfPixel& part : pixel_parts.tell_apart(found, finer)) {
         const float share = static_cast<float>(part.places.size()) / static_cast<float>(finer.size()),

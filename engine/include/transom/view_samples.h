@@ -20,7 +20,8 @@ struct BeamPoint {
   int pixel = 0;
   int sample = 0;  ///< of the pixel: row of samples * edge_samples + column, or one of the below
 
-  static constexpr int kCentre = -1, kNotInMasks = -2;  ///< kNotInMasks: surface that no square of the samples is full of
+  static constexpr int kCentre = -1,
+                       kNotInMasks = -2;  ///< kNotInMasks: surface that no square of the samples is full of
 };
 
 constexpr int kFiner = 2;  ///< times as many samples an axis say how much of a pixel each surface covers
@@ -30,16 +31,24 @@ constexpr int kFiner = 2;  ///< times as many samples an axis say how much of a 
 /// axis of the picture, as most edges of buildings are, is found to 1 / samples_per_axis^2 of the pixel.
 glm::vec2 sample_place(int sample, int samples_per_axis);
 
+/// Where a pixel without an edge is tested for beams: one of nine places, so that any three pixels side by side find
+/// light or shade of a third of a pixel between them.
+glm::vec2 scattered_place(int x, int y);
+
+/// Where the ray through a point of the picture meets the plane through another point.
+glm::vec3 place_on_plane(const CameraRays& camera, glm::vec3 eye, glm::vec2 pixel, glm::vec3 of_plane,
+                         glm::vec3 normal);
+
 /// The samples of a picture. Pixels without an edge of a surface have one, at their centre. The others are parts, by
-/// what is seen: edge_samples^2 samples stand for them, and a grid that is kFiner times as fine an axis says how much of
-/// the pixel each part covers. All but beams is summed beforehand as weights.
+/// what is seen: edge_samples^2 samples stand for them, and a grid that is kFiner times as fine an axis says how much
+/// of the pixel each part covers. All but beams is summed beforehand as weights.
 struct ViewSamples {
   ViewSamples(const Engine& engine, const View& view, int edge_samples);
 
   View view;
   int edge_samples;
   std::vector<char> has_edge;       ///< by pixel: an edge of a surface
-  std::vector<BeamPoint> centre;    ///< by pixel: the surface at its centre
+  std::vector<BeamPoint> centre;    ///< by pixel: the surface at its centre; where it has no edge, at `scattered_place`
   std::vector<BeamPoint> fine;      ///< samples of pixels with an edge, part by part
   std::vector<BeamPoint> on_panes;  ///< room sides of openings in front of either
 
