@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <vector>
+
 #include "rooms.h"
 
 namespace transom {
@@ -67,6 +70,64 @@ TEST(Frame, ThePictureIsTheSameWithoutItsParts) {
   EXPECT_TRUE(sum.sun.empty());
   for (std::size_t p = 0; p < all.radiance.size(); ++p)
     EXPECT_NEAR(sum.radiance[p].y, all.radiance[p].y, 1e-4f * all.radiance[p].y);
+}
+
+/// A room whose roof light has thin bars across it, so that pixels are crossed by shade that none of their centres
+/// sees.
+SceneGeometry barred_room() {
+  SceneGeometry scene = roof_light_room(0.5f);
+  for (int bar = 0; bar < 6; ++bar) test::add_box(scene, {0.9, 1.1 + 0.3 * bar, 2.9}, {3.1, 1.14 + 0.3 * bar, 2.92}, 0);
+  return scene;
+}
+
+/// Means of square blocks of a picture's channel.
+std::vector<float> block_means(const std::vector<glm::vec3>& picture, int width, int side) {
+  const auto height = static_cast<int>(picture.size()) / width;
+  std::vector<float> means(static_cast<std::size_t>(width / side) * static_cast<std::size_t>(height / side), 0.f);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      means[static_cast<std::size_t>(y / side * (width / side) + x / side)] +=
+          picture[static_cast<std::size_t>(y * width + x)].y / static_cast<float>(side * side);
+  return means;
+}
+
+TEST(Frame, APixelIsTheMeanOfWhatItCoversWhereShadeIsThinnerThanIt) {
+  constexpr int kSide = 8;
+  const Engine engine(barred_room(), tregenza(), few_rays());
+  const auto light = engine.relight(sunny(0.3f));
+  View fine = into_the_room();
+  fine.width *= kSide;
+  fine.height *= kSide;
+  const Frame finer = FrameRenderer(engine).render(fine, *light, {});
+  const std::vector<float> truth = block_means(finer.sun, fine.width, kSide);
+  for (const Visibility visibility : {Visibility::kRays, Visibility::kVolumes}) {
+    const Frame frame = FrameRenderer(engine).render(into_the_room(), *light, {visibility});
+    double sum = 0, error = 0, bias = 0;
+    for (std::size_t p = 0; p < truth.size(); ++p) {
+      sum += truth[p];
+      error += std::abs(frame.sun[p].y - truth[p]);
+      bias += frame.sun[p].y - truth[p];
+    }
+    // Sixteen samples of an edge are wrong by some 2 % of the step on the mean.
+    EXPECT_LT(error / sum, 0.02) << static_cast<int>(visibility);
+    EXPECT_LT(std::abs(bias) / sum, 0.003) << static_cast<int>(visibility);
+  }
+}
+
+TEST(Frame, SkyAndGroundDoNotBlendAtTheHorizonOfAPicture) {
+  const SkyBinIndex bins(tregenza());
+  for (const int height : {2, 5, 128}) {
+    Condition condition = uniform_sky(1000, 100);
+    condition.picture_height = height;
+    condition.picture_width = 2 * height;
+    for (int row = 0; row < height; ++row)
+      for (int column = 0; column < 2 * height; ++column)
+        condition.picture.emplace_back(2 * row <= height - 1 ? 1000.f : 100.f);
+    for (const float z : {1e-4f, 0.01f, 0.3f}) {
+      EXPECT_FLOAT_EQ(condition.seen(glm::normalize(glm::vec3(1, 0.5f, z)), bins).y, 1000) << height << ' ' << z;
+      EXPECT_FLOAT_EQ(condition.seen(glm::normalize(glm::vec3(1, 0.5f, -z)), bins).y, 100) << height << ' ' << z;
+    }
+  }
 }
 
 TEST(Engine, SensorsAskedAgainUnderAnotherHourAreThoseOfAFreshEngine) {
