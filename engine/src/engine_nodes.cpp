@@ -28,7 +28,9 @@ constexpr float kLargeForBuried = 3;  // and the leniency up to which they are
 
 // A part is looked at when light differs between its corners by more than these multiples of the tolerance.
 constexpr float kLookNear = 1.5f, kLookFar = 3, kLookSplit = 0.75f;
-constexpr float kSteep = 6;     // and is divided whatever its middle says: a step may be half up in the middle
+constexpr float kSteep = 6;    // and is divided whatever its middle says: a step may be half up in the middle
+constexpr float kSloping = 2;  // from which on the middle is to be right to this share of the tolerance:
+constexpr float kSlopingShare = 0.35f;
 constexpr float kNear = 0.25f;  // length of a part against the distance of what it sees
 
 }  // namespace
@@ -206,10 +208,12 @@ bool Engine::is_to_be_divided(const NodeTrial& trial, int part, int level, float
     for (int k = 0; k < nodes_->corner_count(part); ++k) is_any_exposed |= nodes_->is_exposed(nodes_->corners(part)[k]);
     return is_any_exposed && level < kBuriedLevels && leniency < kLargeForBuried;
   }
-  if (trial.difference(*nodes_, part) > kSteep * tolerance * leniency) return true;
+  const float difference = trial.difference(*nodes_, part);
+  if (difference > kSteep * tolerance * leniency) return true;
+  const float bound = tolerance * leniency * (difference > kSloping * tolerance * leniency ? kSlopingShare : 1.f);
   return std::any_of(trial.lights.begin(), trial.lights.end(), [&](const TrialLight& light) {
     const float found = light.at_nodes[middle];
-    return std::abs(found - light.of(predicted)) > tolerance * leniency * std::max(found, light.dark);
+    return std::abs(found - light.of(predicted)) > bound * std::max(found, light.dark);
   });
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "frame_masks.h"
 #include "transom/parallel.h"
@@ -13,6 +14,14 @@ namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr std::size_t kBlock = 256;  // pixels or points at once
 constexpr float kSameShare = 0.02f;  // of a beam, between neighbouring pixels without an edge
+constexpr float kSameCurve = 0.9f;   // cosine between normals of neighbouring pixels on one surface
+
+// Whether a point is on the surface of another one, flat or curved.
+bool is_continued(const BeamPoint& a, const BeamPoint& b) {
+  if (b.surface < 0 || glm::dot(a.normal, b.normal) < kSameCurve) return false;
+  const glm::vec3 between = b.position - a.position;
+  return std::abs(glm::dot(between, a.normal)) < (1 - kSameCurve) * glm::length(between);
+}
 
 }  // namespace
 
@@ -59,14 +68,14 @@ void FrameRenderer::find_shares(const Beam& beam, std::span<const BeamPoint> poi
     if (points[k].surface < 0 || glm::dot(points[k].normal, beam.direction_to_source) <= 0) continue;
     const glm::vec3 normal = engine_.faces().faces[points[k].surface / 2].normal;
     if ((glm::dot(normal, beam.direction_to_source) > 0) != (points[k].surface % 2 == 0)) continue;
-    if (mask_share) {
+    if (mask_share && points[k].sample != BeamPoint::kNotInMasks) {
       shares[k] = (*mask_share)[masks.index(points[k].pixel, points[k].sample)];
       continue;
     }
     facing.push_back(k);
     facing_points.push_back(points[k].position);
   }
-  if (mask_share) return;
+  if (facing.empty()) return;
   found.resize(facing.size());
   engine_.direct_light().beam_transmission(beam, facing_points, found);
   for (std::size_t k = 0; k < facing.size(); ++k) shares[facing[k]] = found[k];
@@ -113,10 +122,22 @@ void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const
            engine_.reflectance(point.surface / 2, point.surface % 2) * beam.normal_illuminance;
   };
 
-  // Pixels on one surface: the centre speaks for them, unless neighbours are lit otherwise. Then all samples are tested
-  // on the plane of the centre.
+  // Pixels on one surface: one point speaks for them, unless neighbours are lit otherwise. Then all samples are tested
+  // on its plane.
   const CameraRays camera(samples.view);
   const glm::vec3 eye(samples.view.position - engine_.faces().origin);
+  const auto on_plane = [&](BeamPoint point, int sample, int samples_per_axis) {
+    const glm::vec2 corner(point.pixel % width, point.pixel / width);
+    point.position = place_on_plane(camera, eye, corner + sample_place(sample, samples_per_axis), point.position,
+                                    engine_.faces().faces[point.surface / 2].normal);
+    point.sample = sample;
+    return point;
+  };
+  const auto for_neighbours = [&](int pixel, const auto& visit) {
+    const int x = pixel % width, y = pixel / width;
+    for (int j = std::max(y - 1, 0); j <= std::min(y + 1, height - 1); ++j)
+      for (int i = std::max(x - 1, 0); i <= std::min(x + 1, width - 1); ++i) visit(j * width + i);
+  };
   parallel_indices(static_cast<std::size_t>(height), 1, [&](std::size_t row) {
     std::vector<BeamPoint> points;
     std::vector<float> shares;
@@ -131,10 +152,7 @@ void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const
       if (samples.has_edge[pixel] || centre.surface < 0) continue;
       bool edge = false;
       if (s > 1) {
-        for (int dy = -1; dy <= 1; ++dy)
-          for (int dx = -1; dx <= 1; ++dx)
-            if (x + dx >= 0 && x + dx < width && y + dy >= 0 && y + dy < height)
-              edge |= std::abs(share[pixel] - share[pixel + dy * width + dx]) > kSameShare;
+        for_neighbours(pixel, [&](int other) { edge |= std::abs(share[pixel] - share[other]) > kSameShare; });
         if (mask_share && !edge)
           for (int k = 0; k < s * s; ++k)
             edge |= (*mask_share)[masks.index(pixel, k)] != (*mask_share)[masks.index(pixel, -1)];
@@ -144,29 +162,47 @@ void FrameRenderer::add_beam(const ViewSamples& samples, const Beam& beam, const
         continue;
       }
       is_edge[pixel] = 1;
-      const glm::vec3 normal = engine_.faces().faces[centre.surface / 2].normal;
-      const float height_of_plane = glm::dot(centre.position - eye, normal);
-      for (int k = 0; k < s * s; ++k) {
-        const glm::vec3 direction = camera.direction(glm::vec2(x, y) + sample_place(k, s));
-        BeamPoint& point = points.emplace_back(centre);
-        point.position = eye + direction * (height_of_plane / glm::dot(direction, normal));
-        point.sample = k;
-      }
+      for (int k = 0; k < s * s; ++k) points.push_back(on_plane(centre, k, s));
     }
     shares.resize(points.size());
-    find_shares(beam, points, mask_share, masks, shares);
+    find_shares(beam, points, nullptr, masks, shares);
     for (std::size_t k = 0; k < points.size(); ++k)
       if (shares[k] > 0) picture[points[k].pixel] += reflected(points[k], shares[k] / static_cast<float>(s * s));
   });
 
-  // Pixels with an edge of a surface, and panes: every sample for itself. Neither depends on the other's order.
-  for (const std::vector<BeamPoint>* points : {&samples.fine, &samples.on_panes}) {
-    const std::vector<float>* shares_by_mask = points == &samples.fine ? mask_share : nullptr;
-    const std::vector<Box>& boxes = points == &samples.fine ? fine_boxes_ : pane_boxes_;
-    find_shares_by_block(beam, *points, boxes, shares_by_mask, masks, share);
-    for (std::size_t k = 0; k < points->size(); ++k)
-      if (share[k] > 0) picture[(*points)[k].pixel] += reflected((*points)[k], share[k]);
-  }
+  // Pixels with an edge of a surface: every sample for itself, unless a beam ends within what is seen of a surface.
+  const std::vector<float> centre_share = share;
+  find_shares_by_block(beam, samples.fine, fine_boxes_, mask_share, masks, share);
+  const int finer = kFiner * s;
+  parallel_ranges(samples.parts.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    std::vector<BeamPoint> points;
+    std::vector<float> shares;
+    for (std::size_t i = begin; i < end; ++i) {
+      const ViewSamples::Part& part = samples.parts[i];
+      const BeamPoint& first = samples.fine[part.first_point];
+      const float of_first = share[part.first_point];
+      const auto is_other = [&](float other) { return std::abs(other - of_first) > kSameShare; };
+      bool ends = std::any_of(&share[part.first_point], &share[part.last_point - 1] + 1, is_other);
+      for_neighbours(first.pixel, [&](int other) {
+        ends |= is_other(centre_share[other]) && is_continued(first, samples.centre[other]);
+      });
+      if (!ends) continue;
+      points.clear();
+      for (std::size_t k = part.first_place; k < part.last_place; ++k)
+        points.push_back(on_plane(first, samples.places[k], finer));
+      shares.resize(points.size());
+      find_shares(beam, points, nullptr, masks, shares);
+      std::fill(&share[part.first_point], &share[part.last_point - 1] + 1,
+                std::accumulate(shares.begin(), shares.end(), 0.f) / static_cast<float>(shares.size()));
+    }
+  });
+  const auto add = [&](const std::vector<BeamPoint>& points) {
+    for (std::size_t k = 0; k < points.size(); ++k)
+      if (share[k] > 0) picture[points[k].pixel] += reflected(points[k], share[k]);
+  };
+  add(samples.fine);
+  find_shares_by_block(beam, samples.on_panes, pane_boxes_, nullptr, masks, share);
+  add(samples.on_panes);
 }
 
 // Light of sky and of surfaces, between nodes. Extrapolation beyond the outermost nodes never makes it or a part of it

@@ -79,8 +79,11 @@ glm::vec3 Condition::seen(glm::vec3 direction, const SkyBinIndex& bins) const {
     const int bin = bins(direction);
     return bin == bins.count() - 1 ? ground_luminance : sky_luminance[bin] * sky_colour;
   }
+  // Between rows on the same side of the horizon: sky and ground do not blend.
   const float theta = std::acos(std::clamp(direction.z, -1.f, 1.f));
-  const float y = theta / std::numbers::pi_v<float> * static_cast<float>(picture_height - 1);
+  const float last_row = static_cast<float>(picture_height - 1);
+  float y = theta / std::numbers::pi_v<float> * last_row;
+  y = direction.z < 0 ? std::max(y, std::floor(last_row / 2) + 1) : std::min(y, std::floor(last_row / 2));
   const float x = azimuth_of(direction) / kTwoPi * static_cast<float>(picture_width) - 0.5f;
   const int y0 = std::clamp(static_cast<int>(y), 0, picture_height - 2);
   const int x0 = static_cast<int>(std::floor(x));

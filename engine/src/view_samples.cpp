@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <utility>
 
 #include "transom/parallel.h"
 
@@ -94,9 +96,87 @@ BeamPoint beam_point(const Engine& engine, const Seen& seen, float weight, int p
           sample};
 }
 
+// Names what a ray has met: a side of a face, the sky or the ground, and how many openings are in front of it.
+std::int64_t name_of(const Seen& seen) {
+  const std::int64_t surface =
+      seen.hit.face >= 0 ? 2 * std::int64_t{seen.hit.face} + seen.hit.side + 2 : (seen.direction.z < 0 ? 1 : 0);
+  return surface * (kMaximumCrossings + 2) + seen.crossings;
+}
+
+// A sample of a pixel.
+struct Sample {
+  Seen seen;
+  int place;  // BeamPoint::sample
+};
+
+// All that is alike of what a pixel sees.
+struct PartOfPixel {
+  std::vector<Sample> samples;
+  std::vector<int> places;  // of the finer grid, at which it is seen
+};
+
+// Tells apart what the samples of a pixel see, by two grids: each part has the samples of the coarser one, or of the
+// finer one where the coarser has missed it, and covers as much of the pixel as the finer one says.
+class PixelParts {
+ public:
+  explicit PixelParts(int samples_per_axis) : s_(samples_per_axis) {}
+
+  const std::vector<PartOfPixel>& tell_apart(const std::vector<Seen>& coarse, const std::vector<Seen>& finer) {
+    parts_.clear();
+    names_.clear();
+    part_at_.clear();
+    for (std::size_t k = 0; k < finer.size(); ++k) {
+      const std::size_t part = part_of(name_of(finer[k]));
+      if (part == parts_.size()) {
+        names_.push_back(name_of(finer[k]));
+        parts_.emplace_back();
+      }
+      parts_[part].places.push_back(static_cast<int>(k));
+      part_at_.push_back(part);
+    }
+    for (std::size_t k = 0; k < coarse.size(); ++k) {
+      const std::size_t part = part_of(name_of(coarse[k]));
+      if (part < parts_.size()) parts_[part].samples.push_back({coarse[k], place_in_masks(part, static_cast<int>(k))});
+    }
+    for (std::size_t part = 0; part < parts_.size(); ++part)
+      if (parts_[part].samples.empty())
+        parts_[part].samples.push_back(
+            {finer[static_cast<std::size_t>(parts_[part].places.front())], place_in_masks(part, 0)});
+    return parts_;
+  }
+
+ private:
+  std::size_t part_of(std::int64_t name) const {
+    return static_cast<std::size_t>(std::find(names_.begin(), names_.end(), name) - names_.begin());
+  }
+  // A place of the coarser grid around which only this part is seen, so that the middle of its square, where masks are
+  // drawn, sees it too: the own one, or another.
+  int place_in_masks(std::size_t part, int own) const {
+    const auto is_whole = [&](int place) {
+      for (int j = 0; j < kFiner; ++j)
+        for (int i = 0; i < kFiner; ++i)
+          if (part_at_[static_cast<std::size_t>((place / s_ * kFiner + j) * kFiner * s_ + place % s_ * kFiner + i)] !=
+              part)
+            return false;
+      return true;
+    };
+    if (is_whole(own)) return own;
+    for (int place = 0; place < s_ * s_; ++place)
+      if (is_whole(place)) return place;
+    return BeamPoint::kNotInMasks;
+  }
+
+  int s_;
+  std::vector<std::int64_t> names_;
+  std::vector<PartOfPixel> parts_;
+  std::vector<std::size_t> part_at_;  // by place of the finer grid
+};
+
 // What one row of the picture found, in the order of its pixels.
 struct RowOfPixels {
   std::vector<BeamPoint> fine, on_panes;
+  std::vector<ViewSamples::Part> parts;
+  std::vector<int> places;
   std::vector<std::vector<Share>> smooth;
   std::vector<ViewSamples::Constant> constant;
   std::vector<ViewSamples::Outlook> outlooks;
@@ -139,6 +219,17 @@ glm::vec2 sample_place(int sample, int samples_per_axis) {
   return {within(column, row), within(row, samples_per_axis - 1 - column)};
 }
 
+glm::vec2 scattered_place(int x, int y) {
+  constexpr int kPeriod = 3;
+  return sample_place(x % kPeriod * kPeriod + y % kPeriod, kPeriod);
+}
+
+glm::vec3 place_on_plane(const CameraRays& camera, glm::vec3 eye, glm::vec2 pixel, glm::vec3 of_plane,
+                         glm::vec3 normal) {
+  const glm::vec3 direction = camera.direction(pixel);
+  return eye + direction * (glm::dot(of_plane - eye, normal) / glm::dot(direction, normal));
+}
+
 ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_per_axis)
     : view(camera), edge_samples(std::max(1, samples_per_axis)) {
   const int width = view.width, height = view.height, s = edge_samples;
@@ -159,6 +250,7 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
   const float same_plane = 1e-4f * engine.faces().extent;
   const auto differ = [&](const Seen& a, const Seen& b) {
     if (a.crossings != b.crossings || (a.hit.face < 0) != (b.hit.face < 0)) return true;
+    if (a.hit.face < 0) return (a.direction.z < 0) != (b.direction.z < 0);
     if (a.hit.face == b.hit.face) return a.hit.side != b.hit.side;
     const Face &f = engine.faces().faces[a.hit.face], &g = engine.faces().faces[b.hit.face];
     const float cosine = glm::dot(f.normal, g.normal) * (a.hit.side == b.hit.side ? 1.f : -1.f);
@@ -178,31 +270,55 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
     });
 
   // Samples, row by row of the picture.
+  const CameraRays camera_rays(view);
+  const glm::vec3 eye(view.position - engine.faces().origin);
   centre.resize(pixel_count);
   std::vector<RowOfPixels> rows(row_count);
   parallel_indices(row_count, 1, [&](std::size_t y) {
     RowOfPixels& row = rows[y];
     row.smooth.resize(row_size);
     Tracer tracer(engine, view);
-    std::vector<glm::vec2> points(static_cast<std::size_t>(s * s));
-    std::vector<Seen> found;
-    std::vector<SeenPane> found_panes;
+    std::vector<glm::vec2> points;
+    std::vector<Seen> found, finer;
+    std::vector<SeenPane> panes_found, finer_panes;
+    PixelParts pixel_parts(s);
+    const auto trace_grid = [&](std::size_t x, int of_axis, std::vector<Seen>& met, std::vector<SeenPane>& panes_met) {
+      points.clear();
+      for (int k = 0; k < of_axis * of_axis; ++k) points.push_back(glm::vec2(x, y) + sample_place(k, of_axis));
+      tracer.trace(points, met, panes_met);
+    };
     for (std::size_t x = 0; x < row_size; ++x) {
       const std::size_t p = y * row_size + x;
       const int pixel = static_cast<int>(p);
+      if (has_edge[p]) {  // beside the pixel, or in it
+        trace_grid(x, s, found, panes_found);
+        has_edge[p] =
+            std::any_of(found.begin(), found.end(), [&](const Seen& other) { return differ(seen[p], other); });
+      }
       if (!has_edge[p]) {
-        centre[p] = add_sample(engine, seen[p], 1, pixel, -1, row.smooth[x], row);
+        centre[p] = add_sample(engine, seen[p], 1, pixel, BeamPoint::kCentre, row.smooth[x], row);
+        if (s > 1 && centre[p].surface >= 0)
+          centre[p].position = place_on_plane(
+              camera_rays, eye, glm::vec2(x, y) + scattered_place(static_cast<int>(x), static_cast<int>(y)),
+              centre[p].position, engine.faces().faces[seen[p].hit.face].normal);
         continue;
       }
-      centre[p] = beam_point(engine, seen[p], 1, pixel, -1);
-      for (int k = 0; k < s * s; ++k) points[k] = glm::vec2(x, y) + sample_place(k, s);
-      tracer.trace(points, found, found_panes);
-      const float weight = 1 / static_cast<float>(s * s);
-      for (int k = 0; k < s * s; ++k) {
-        const BeamPoint point = add_sample(engine, found[k], weight, pixel, k, row.smooth[x], row);
-        if (point.surface >= 0) row.fine.push_back(point);
+      centre[p] = beam_point(engine, seen[p], 1, pixel, BeamPoint::kCentre);
+      trace_grid(x, kFiner * s, finer, finer_panes);
+      for (const PartOfPixel& part : pixel_parts.tell_apart(found, finer)) {
+        const float share = static_cast<float>(part.places.size()) / static_cast<float>(finer.size()),
+                    weight = share / static_cast<float>(part.samples.size());
+        const std::size_t first_point = row.fine.size();
+        for (const Sample& sample : part.samples) {
+          const BeamPoint point = add_sample(engine, sample.seen, weight, pixel, sample.place, row.smooth[x], row);
+          if (point.surface >= 0) row.fine.push_back(point);
+        }
+        if (row.fine.size() == first_point) continue;
+        row.parts.push_back({first_point, row.fine.size(), row.places.size(), row.places.size() + part.places.size()});
+        row.places.insert(row.places.end(), part.places.begin(), part.places.end());
       }
-      for (const SeenPane& pane : found_panes)
+      const float weight = 1 / static_cast<float>(s * s);
+      for (const SeenPane& pane : panes_found)
         row.on_panes.push_back(
             add_sample(engine, pane.seen, weight, pixel, static_cast<int>(pane.ray), row.smooth[x], row));
     }
@@ -218,6 +334,10 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
   smooth.entries.reserve(share_count);
   smooth.begin.reserve(pixel_count + 1);
   for (const RowOfPixels& row : rows) {
+    for (const Part& part : row.parts)
+      parts.push_back({part.first_point + fine.size(), part.last_point + fine.size(), part.first_place + places.size(),
+                       part.last_place + places.size()});
+    places.insert(places.end(), row.places.begin(), row.places.end());
     fine.insert(fine.end(), row.fine.begin(), row.fine.end());
     on_panes.insert(on_panes.end(), row.on_panes.begin(), row.on_panes.end());
     constant.insert(constant.end(), row.constant.begin(), row.constant.end());

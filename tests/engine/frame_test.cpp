@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <vector>
+
 #include "rooms.h"
 
 namespace transom {
@@ -67,6 +70,48 @@ TEST(Frame, ThePictureIsTheSameWithoutItsParts) {
   EXPECT_TRUE(sum.sun.empty());
   for (std::size_t p = 0; p < all.radiance.size(); ++p)
     EXPECT_NEAR(sum.radiance[p].y, all.radiance[p].y, 1e-4f * all.radiance[p].y);
+}
+
+double sum_of_sun(const Frame& frame) {
+  double sum = 0;
+  for (const glm::vec3& value : frame.sun) sum += value.y;
+  return sum / static_cast<double>(frame.sun.size());
+}
+
+TEST(Frame, RaysFindShadeThinnerThanAPixelWhereverItLies) {
+  constexpr int kFinerPicture = 8;
+  SceneGeometry barred = roof_light_room(0.5f);  // with a bar before its roof light of 3 cm
+  test::add_box(barred, {0.9, 1.95, 2.9}, {3.1, 1.98, 2.92}, 0);
+  const Engine engine(barred, tregenza(), few_rays()), open(roof_light_room(0.5f), tregenza(), few_rays());
+  const auto light = engine.relight(sunny(0.3f)), without_bar = open.relight(sunny(0.3f));
+  for (const double height : {0.0, 0.012, 0.024, 0.036}) {  // along the rows of the picture, half a pixel in all
+    View coarse = into_the_room();
+    coarse.position = {2, 0.3, 1.5};
+    coarse.target = {2, 3, height};
+    View fine = coarse;
+    fine.width *= kFinerPicture;
+    fine.height *= kFinerPicture;
+    const double truth = sum_of_sun(FrameRenderer(engine).render(fine, *light, {})),
+                 shade = sum_of_sun(FrameRenderer(open).render(fine, *without_bar, {})) - truth;
+    ASSERT_GT(shade, 0.01 * truth);
+    EXPECT_NEAR(sum_of_sun(FrameRenderer(engine).render(coarse, *light, {})), truth, 0.2 * shade) << height;
+  }
+}
+
+TEST(Frame, SkyAndGroundDoNotBlendAtTheHorizonOfAPicture) {
+  const SkyBinIndex bins(tregenza());
+  for (const int height : {2, 5, 128}) {
+    Condition condition = uniform_sky(1000, 100);
+    condition.picture_height = height;
+    condition.picture_width = 2 * height;
+    for (int row = 0; row < height; ++row)
+      for (int column = 0; column < 2 * height; ++column)
+        condition.picture.emplace_back(2 * row <= height - 1 ? 1000.f : 100.f);
+    for (const float z : {1e-4f, 0.01f, 0.3f}) {
+      EXPECT_FLOAT_EQ(condition.seen(glm::normalize(glm::vec3(1, 0.5f, z)), bins).y, 1000) << height << ' ' << z;
+      EXPECT_FLOAT_EQ(condition.seen(glm::normalize(glm::vec3(1, 0.5f, -z)), bins).y, 100) << height << ' ' << z;
+    }
+  }
 }
 
 TEST(Engine, SensorsAskedAgainUnderAnotherHourAreThoseOfAFreshEngine) {
