@@ -175,7 +175,7 @@ std::vector<int> slots_that_see(const std::vector<char>& is_interior, const std:
 }
 
 std::vector<float> choose_edges(const Faces& faces, const std::vector<char>& is_indoors, float maximum_edge,
-                                int target_patch_count) {
+                                float outdoor_edge, int target_patch_count) {
   double indoors = 0, outdoors = 0;
   for (std::size_t f = 0; f < faces.faces.size(); ++f) {
     const double sides = faces.is_inside_solid(static_cast<int>(f), 1) ? 1 : 2;
@@ -183,10 +183,11 @@ std::vector<float> choose_edges(const Faces& faces, const std::vector<char>& is_
   }
   if (indoors == 0) std::swap(indoors, outdoors);
   const double edge = maximum_edge > 0 ? maximum_edge : std::sqrt(indoors / target_patch_count);
-  const double outdoor_edge = std::max(edge, std::sqrt(outdoors / kOutdoorPatchCount));
+  const double edge_outdoors =
+      std::max(edge, outdoor_edge > 0 ? outdoor_edge : std::sqrt(outdoors / kOutdoorPatchCount));
   std::vector<float> edges;
   for (const char indoor : is_indoors)
-    edges.push_back(static_cast<float>(indoor || indoors == 0 ? edge : outdoor_edge));
+    edges.push_back(static_cast<float>(indoor || indoors == 0 ? edge : edge_outdoors));
   return edges;
 }
 

@@ -19,9 +19,10 @@ namespace transom {
 std::vector<char> survey_interior(const SceneGeometry& scene, const RayScene& rays, Faces& faces, std::uint32_t seed);
 
 /// Longest edge of patches for each face [m]: `maximum_edge` indoors, or the one that gives about `target_patch_count`
-/// patches there where it is 0; outdoors coarser, so that a large ground costs little.
+/// patches there where it is 0; outdoors coarser, so that a large ground costs little: `outdoor_edge`, or what gives a few
+/// hundred patches there where that is 0, and no less than indoors.
 std::vector<float> choose_edges(const Faces& faces, const std::vector<char>& is_indoors, float maximum_edge,
-                                int target_patch_count);
+                                float outdoor_edge, int target_patch_count);
 
 /// Slots, not yet patches, whose own rays meet a patch indoors: what thousands of rays from the patches have missed,
 /// such as thin blades, still exchanges light with them. is_interior: by slot.
