@@ -43,9 +43,9 @@ void Engine::solve(const Engine* solved) {
     faces_ = make_faces(scene_);
     rays_ = std::make_unique<RayScene>(faces_, scene_.materials, scene_.openings);
     sky_index_ = std::make_unique<SkyBinIndex>(sky_bins_);
-    const std::vector<char> is_indoors =
-        survey_interior(scene_, *rays_, faces_, hash_seed(options_.seed, kSurveyStream));
+    std::vector<char> is_indoors = survey_interior(scene_, *rays_, faces_, hash_seed(options_.seed, kSurveyStream));
     check_overlaps(faces_, is_indoors, *rays_);
+    add_sides_that_see_indoors(scene_, faces_, *rays_, options_.seed, is_indoors);
     const std::vector<float> edges = choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.outdoor_edge_m,
                                                   options_.target_patch_count);
     facts_.maximum_edge_m = *std::min_element(edges.begin(), edges.end());
