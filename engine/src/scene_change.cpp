@@ -13,6 +13,7 @@ namespace {
 constexpr int kMostBits = 3;
 constexpr int kEdgeSteps = 64;          // at which the border of a cell is looked at
 constexpr float kAngleMargin = 0.01f;   // for what lies between [rad]
+constexpr double kShaftMargin = 1e-4;   // for the rounding of rays towards an opening close by [rad]
 constexpr float kBoxMargin = 1;         // of the lift of ray origins: large against rounding
 constexpr float kLeastComponent = 1e-12f;  // of a direction, that can be divided by
 
@@ -250,32 +251,28 @@ bool SceneChange::may_meet(const Node& place, float radius, const HemisphereCell
 
 bool SceneChange::may_meet(glm::vec3 place, float radius, const glm::vec3 (&triangle)[3]) const {
   if (spheres_.empty()) return false;
-  const glm::vec3 a = triangle[0] - place, b = triangle[1] - place, c = triangle[2] - place;
+  const glm::dvec3 a(triangle[0] - place), b(triangle[1] - place), c(triangle[2] - place);
   // Planes through the place and the edges, with the triangle in front of them.
-  std::array<glm::vec3, 3> inward{glm::cross(a, b), glm::cross(b, c), glm::cross(c, a)};
-  const float volume = glm::dot(inward[0], c);
-  for (glm::vec3& normal : inward) {
-    const float length = glm::length(normal);
-    if (!(length > 0)) return true;
-    normal *= (volume < 0 ? -1.f : 1.f) / length;
+  std::array<glm::dvec3, 3> inward{glm::cross(a, b), glm::cross(b, c), glm::cross(c, a)};
+  const double volume = glm::dot(inward[0], c);
+  for (glm::dvec3& normal : inward) {
+    const double length = glm::length(normal);
+    if (!(length > 0) || volume == 0) return true;
+    normal *= (volume < 0 ? -1 : 1) / length;
   }
-  if (volume == 0) return true;
   // Distance to the triangle, or less: that to its plane.
-  const glm::vec3 normal = glm::normalize(glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]));
-  const float nearest = std::abs(glm::dot(a, normal)) - radius;
-  const glm::vec3 axis = glm::normalize(glm::normalize(a) + glm::normalize(b) + glm::normalize(c));
+  glm::dvec3 across = glm::normalize(glm::cross(b - a, c - a));
+  if (glm::dot(a, across) < 0) across = -across;
+  const double nearest = glm::dot(a, across) - radius;
+  if (radius > 0 && !(nearest > 0)) return true;
   return std::any_of(spheres_.begin(), spheres_.end(), [&](const Sphere& sphere) {
-    const glm::vec3 to_middle = sphere.middle - place;
-    // A ray from beside the place is never farther from one of the place to the same point of the triangle than this:
-    // by the radius as far as there, and beyond in proportion.
-    float reach = sphere.radius + radius;
-    if (radius > 0) {
-      if (!(nearest > 0)) return true;
-      const float stretch = (glm::length(to_middle) + reach) / nearest;
-      reach = sphere.radius + radius * std::max(1.f, stretch);
-    }
-    return glm::dot(to_middle, axis) >= -reach &&
-           std::all_of(inward.begin(), inward.end(), [&](glm::vec3 n) { return glm::dot(to_middle, n) >= -reach; });
+    const glm::dvec3 to_middle(sphere.middle - place);
+    const double distance = glm::length(to_middle);
+    double reach = sphere.radius + radius + kShaftMargin * distance;
+    // A ray from beside the place is away by the radius at most as far as the triangle, and beyond in proportion.
+    if (radius > 0) reach += radius * std::max(0.0, (distance + reach) / nearest - 1);
+    return glm::dot(to_middle, across) >= -reach &&
+           std::all_of(inward.begin(), inward.end(), [&](glm::dvec3 n) { return glm::dot(to_middle, n) >= -reach; });
   });
 }
 
