@@ -306,8 +306,9 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
 void Engine::link_nodes(const Known& known) {
   links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes());
   PointLinks::Known known_links;
-  if (known.has_same_faces() && known.engine->links_)
-    known_links = {known.engine->links_.get(), known.node, known.has_same_nodes, known.has_openings};
+  if (known.engine && known.engine->links_)
+    known_links = {known.engine->links_.get(), known.change.get(), known.node, known.has_same_nodes,
+                   known.has_openings};
   links_->prepare(beam_slots(), known_links);
   facts_.link_bytes = links_->byte_count();
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include "transom/sampling.h"
 
@@ -32,6 +33,12 @@ bool is_same_place(const Face& f, const Face& g) {
 
 bool is_solid(const Faces& faces, std::size_t face) {
   return faces.component_is_solid[static_cast<std::size_t>(faces.faces[face].component)] != 0;
+}
+
+// Most often they are sorted: what stays keeps its order as a rule.
+void sort_by_index(std::vector<Share>& shares) {
+  const auto is_before = [](const Share& a, const Share& b) { return a.index < b.index; };
+  if (!std::is_sorted(shares.begin(), shares.end(), is_before)) std::sort(shares.begin(), shares.end(), is_before);
 }
 
 }  // namespace
@@ -142,7 +149,7 @@ void SceneChange::match_slots(const LightMesh& before, const LightMesh& after) {
 
 std::vector<Share> SceneChange::renumbered(std::vector<Share> slots) const {
   std::erase_if(slots, [&](Share& share) { return (share.index = slot_after(share.index)) < 0; });
-  merge_shares(slots);
+  sort_by_index(slots);
   return slots;
 }
 
@@ -152,7 +159,7 @@ std::vector<Share> SceneChange::renumbered_elements(std::vector<Share> elements)
     share.index = slot * elements_per_slot_ + share.index % elements_per_slot_;
     return slot < 0;
   });
-  merge_shares(elements);
+  sort_by_index(elements);
   return elements;
 }
 
@@ -221,6 +228,17 @@ bool SceneChange::may_meet(const Ray& ray) const {
     const glm::vec3 a = (box.low - ray.origin) * inverse, b = (box.high - ray.origin) * inverse;
     const glm::vec3 first = glm::min(a, b), last = glm::max(a, b);
     return std::max({first.x, first.y, first.z, ray.t_near}) <= std::min({last.x, last.y, last.z, ray.t_far});
+  });
+}
+
+bool SceneChange::may_meet(glm::vec3 from, glm::vec3 to, float radius) const {
+  const glm::vec3 along = to - from;
+  const float length2 = std::max(glm::dot(along, along), std::numeric_limits<float>::min());
+  return std::any_of(spheres_.begin(), spheres_.end(), [&](const Sphere& sphere) {
+    const glm::vec3 to_middle = sphere.middle - from;
+    const glm::vec3 nearest = std::clamp(glm::dot(to_middle, along) / length2, 0.f, 1.f) * along - to_middle;
+    const float reach = sphere.radius + radius;
+    return glm::dot(nearest, nearest) <= reach * reach;
   });
 }
 

@@ -39,6 +39,10 @@ class SceneChange {
   /// Whether a ray or segment may meet what has changed. False is certain.
   bool may_meet(const Ray& ray) const;
 
+  /// Whether a segment from a point to no farther than `radius` from another may meet what has changed. False is
+  /// certain.
+  bool may_meet(glm::vec3 from, glm::vec3 to, float radius) const;
+
   /// Of the cells of a hemisphere (HemisphereCells): whether a ray within each, from no farther than `radius` from the
   /// place, may meet what has changed. False is certain. Returns whether any may.
   bool may_meet(const Node& place, float radius, const HemisphereCells& cells, std::vector<char>& of_cell) const;
