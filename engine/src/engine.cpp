@@ -46,8 +46,8 @@ void Engine::solve(const Engine* solved) {
     std::vector<char> is_indoors = survey_interior(scene_, *rays_, faces_, hash_seed(options_.seed, kSurveyStream));
     check_overlaps(faces_, is_indoors, *rays_);
     add_sides_that_see_indoors(scene_, faces_, *rays_, options_.seed, is_indoors);
-    const std::vector<float> edges = choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.outdoor_edge_m,
-                                                  options_.target_patch_count);
+    const std::vector<float> edges =
+        choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.outdoor_edge_m, options_.target_patch_count);
     facts_.maximum_edge_m = *std::min_element(edges.begin(), edges.end());
     facts_.outdoor_edge_m = *std::max_element(edges.begin(), edges.end());
     mesh_ = std::make_unique<LightMesh>(faces_, edges, options_.elements_per_edge, clusters(edges));

@@ -50,7 +50,7 @@ struct Engine::TrialLight {
 struct Engine::NodeTrial {
   std::vector<GatherRow> rows;
   std::vector<TrialLight> lights;
-  std::vector<std::vector<Share>> own_sky;  // seen without looking through an opening
+  std::vector<std::vector<Share>> own_sky;               // seen without looking through an opening
   std::vector<std::vector<Share>> unlit, unlit_through;  // slots that are no patches
   float longest_edge;
 

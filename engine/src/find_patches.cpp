@@ -81,7 +81,9 @@ Engine::PatchRow Engine::patch_row(int slot, const Known& known) const {
 }
 
 // What a patch sees without looking through openings, from what it saw in another state of the scene, if that is known.
-std::shared_ptr<const GatherRow> Engine::surroundings_of_patch(int slot, const std::shared_ptr<const GatherRow>& known_row, const Known& known) const {
+std::shared_ptr<const GatherRow> Engine::surroundings_of_patch(int slot,
+                                                               const std::shared_ptr<const GatherRow>& known_row,
+                                                               const Known& known) const {
   if (known_row && known.has_same_faces()) return known_row;
   const std::uint32_t seed = patch_seed(slot);
   if (!known_row)

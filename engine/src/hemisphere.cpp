@@ -32,8 +32,7 @@ bool change_counts(const std::vector<Share>& known, float known_unit, std::vecto
   for (auto own = known.begin(); own != known.end() || given != found.end();) {
     const int index = given == found.end() || (own != known.end() && own->index <= *given) ? own->index : *given;
     int count = 0;
-    if (own != known.end() && own->index == index)
-      count = static_cast<int>(std::lround((own++)->weight / known_unit));
+    if (own != known.end() && own->index == index) count = static_cast<int>(std::lround((own++)->weight / known_unit));
     for (; given != found.end() && *given == index; ++given) ++count;
     for (; taken != lost.end() && *taken == index; ++taken) --count;
     if (count < 0) return false;

@@ -1,5 +1,5 @@
-// What rays over a hemisphere have met, counted. Whole numbers do not depend on the order of rays, and single rays can be
-// taken back.
+// What rays over a hemisphere have met, counted. Whole numbers do not depend on the order of rays, and single rays can
+// be taken back.
 #pragma once
 
 #include <cstdint>

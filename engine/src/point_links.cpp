@@ -136,21 +136,19 @@ int PointLinks::KnownPoints::number(int point) const {
 }
 
 // The link of a patch in the other state, if the same part of the patch was exposed there.
-std::shared_ptr<const PointLinks::Link> PointLinks::known_link(int slot, const Known& known) const {
+std::shared_ptr<const PointLinks::Link> PointLinks::known_link(int slot, glm::vec3 middle, const Known& known) const {
   const int slot_before = known.links ? known.change->slot_before(slot) : -1;
-  if (slot_before < 0) return nullptr;
-  for (int e = slot * mesh_.elements_per_slot(); e < (slot + 1) * mesh_.elements_per_slot(); ++e) {
-    const Node middle = mesh_.middle_of_element(e);
-    if (mesh_.element_area(e) > 0 && known.change->may_meet(Ray{middle.position, middle.normal})) return nullptr;
-  }
+  if (slot_before < 0 || (!known.change->is_none() && known.links->exposed_middle(slot_before) != middle))
+    return nullptr;
   const std::lock_guard lock(known.links->mutex_);
   return known.links->links_[static_cast<std::size_t>(slot_before)];
 }
 
 std::shared_ptr<const PointLinks::Link> PointLinks::link(int slot_index, const Known& known) const {
-  const std::shared_ptr<const Link> before = known_link(slot_index, known);
+  const glm::vec3 middle = exposed_middle(slot_index);
+  const std::shared_ptr<const Link> before = known_link(slot_index, middle, known);
   if (before && known.has_same_points && (known.has_same_glazing || before->glazed_point.empty())) return before;
-  const glm::vec3 normal = mesh_.normal_of(slot_index), middle = exposed_middle(slot_index);
+  const glm::vec3 normal = mesh_.normal_of(slot_index);
   const float size2 = 2 * mesh_.slot_area(slot_index), size = std::sqrt(size2);
   auto link = std::make_shared<Link>();
   for (int e = slot_index * mesh_.elements_per_slot(); e < (slot_index + 1) * mesh_.elements_per_slot(); ++e)

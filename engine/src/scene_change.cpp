@@ -12,10 +12,10 @@ namespace transom {
 namespace {
 
 constexpr int kMostBits = 3;
-constexpr int kEdgeSteps = 64;          // at which the border of a cell is looked at
-constexpr float kAngleMargin = 0.01f;   // for what lies between [rad]
-constexpr double kShaftMargin = 1e-4;   // for the rounding of rays towards an opening close by [rad]
-constexpr float kBoxMargin = 1;         // of the lift of ray origins: large against rounding
+constexpr int kEdgeSteps = 64;             // at which the border of a cell is looked at
+constexpr float kAngleMargin = 0.01f;      // for what lies between [rad]
+constexpr double kShaftMargin = 1e-4;      // for the rounding of rays towards an opening close by [rad]
+constexpr float kBoxMargin = 1;            // of the lift of ray origins: large against rounding
 constexpr float kLeastComponent = 1e-12f;  // of a direction, that can be divided by
 
 std::uint64_t place_hash(const Face& face) {
@@ -82,7 +82,8 @@ SceneChange::SceneChange(const LightMesh& before, const LightMesh& after)
 void SceneChange::match_faces(const LightMesh& before, const LightMesh& after) {
   const std::vector<Face>&old_faces = before.faces().faces, &new_faces = after.faces().faces;
   std::vector<std::pair<std::uint64_t, int>> by_place;
-  for (std::size_t f = 0; f < old_faces.size(); ++f) by_place.push_back({place_hash(old_faces[f]), static_cast<int>(f)});
+  for (std::size_t f = 0; f < old_faces.size(); ++f)
+    by_place.push_back({place_hash(old_faces[f]), static_cast<int>(f)});
   std::sort(by_place.begin(), by_place.end());
   for (std::size_t f = 0; f < new_faces.size(); ++f) {
     const std::uint64_t hash = place_hash(new_faces[f]);
@@ -165,6 +166,10 @@ std::vector<Share> SceneChange::renumbered_elements(std::vector<Share> elements)
 
 // Few boxes around many: the largest is divided at the middle of its longest axis as long as there may be more.
 void SceneChange::enclose(std::vector<Box> boxes) {
+  for (int axis = 0; axis < 3; ++axis) {
+    low_[axis].fill(Ray::kInfinity);
+    high_[axis].fill(-Ray::kInfinity);
+  }
   if (boxes.empty()) return;
   const auto around = [](std::span<const Box> some) {
     Box all = some[0];
@@ -186,26 +191,33 @@ void SceneChange::enclose(std::vector<Box> boxes) {
       return last - first < 2 ? 0 : size.x * size.y + size.y * size.z + size.z * size.x;
     }
   };
-  std::vector<Group> groups{{0, boxes.size(), around(boxes)}};
+  all_ = around(boxes);
+  std::vector<Group> groups{{0, boxes.size(), all_}};
   while (groups.size() < kBoxes) {
-    const auto largest =
-        std::max_element(groups.begin(), groups.end(), [](const Group& a, const Group& b) { return a.area() < b.area(); });
+    const auto largest = std::max_element(groups.begin(), groups.end(),
+                                          [](const Group& a, const Group& b) { return a.area() < b.area(); });
     if (!(largest->area() > 0)) break;
     const auto [first, last, box] = *largest;
     const int axis = longest_axis(box);
     const auto at = [&](std::size_t k) { return boxes.begin() + static_cast<std::ptrdiff_t>(k); };
     const float half = 0.5f * (box.low[axis] + box.high[axis]);
-    auto middle = std::partition(
-        at(first), at(last), [&](const Box& b) { return 0.5f * (b.low[axis] + b.high[axis]) < half; });
+    auto middle =
+        std::partition(at(first), at(last), [&](const Box& b) { return 0.5f * (b.low[axis] + b.high[axis]) < half; });
     if (middle == at(first) || middle == at(last)) middle = at((first + last) / 2);
     const auto between = static_cast<std::size_t>(middle - boxes.begin());
     *largest = {first, between, around({boxes.data() + first, between - first})};
     groups.push_back({between, last, around({boxes.data() + between, last - between})});
   }
-  for (const Group& group : groups) boxes_.push_back(group.box);
+  std::vector<Box> parts;
+  for (const Group& group : groups) {
+    for (int axis = 0; axis < 3; ++axis) {
+      low_[axis][parts.size()] = group.box.low[axis];
+      high_[axis][parts.size()] = group.box.high[axis];
+    }
+    parts.push_back(group.box);
+  }
 
   // Spheres around the boxes, the largest of which are halved.
-  std::vector<Box> parts = boxes_;
   const auto radius = [](const Box& box) { return 0.5f * glm::length(box.high - box.low); };
   while (parts.size() < kSpheres) {
     const auto largest =
@@ -216,6 +228,7 @@ void SceneChange::enclose(std::vector<Box> boxes) {
     parts.push_back(upper);
   }
   for (const Box& part : parts) spheres_.push_back({0.5f * (part.low + part.high), radius(part)});
+  around_all_ = {0.5f * (all_.low + all_.high), radius(all_)};
 }
 
 bool SceneChange::may_meet(const Ray& ray) const {
@@ -224,22 +237,35 @@ bool SceneChange::may_meet(const Ray& ray) const {
     const float d = ray.direction[axis];
     inverse[axis] = 1 / (std::abs(d) < kLeastComponent ? std::copysign(kLeastComponent, d) : d);
   }
-  return std::any_of(boxes_.begin(), boxes_.end(), [&](const Box& box) {
-    const glm::vec3 a = (box.low - ray.origin) * inverse, b = (box.high - ray.origin) * inverse;
-    const glm::vec3 first = glm::min(a, b), last = glm::max(a, b);
-    return std::max({first.x, first.y, first.z, ray.t_near}) <= std::min({last.x, last.y, last.z, ray.t_far});
-  });
+  const glm::vec3 a = (all_.low - ray.origin) * inverse, b = (all_.high - ray.origin) * inverse;
+  const glm::vec3 first = glm::min(a, b), last = glm::max(a, b);
+  if (!(std::max({first.x, first.y, first.z, ray.t_near}) <= std::min({last.x, last.y, last.z, ray.t_far})))
+    return false;
+  std::array<float, kBoxes> from, to;
+  from.fill(ray.t_near);
+  to.fill(ray.t_far);
+  for (int axis = 0; axis < 3; ++axis)
+    for (std::size_t k = 0; k < kBoxes; ++k) {
+      const float at_low = (low_[axis][k] - ray.origin[axis]) * inverse[axis],
+                  at_high = (high_[axis][k] - ray.origin[axis]) * inverse[axis];
+      from[k] = std::max(from[k], std::min(at_low, at_high));
+      to[k] = std::min(to[k], std::max(at_low, at_high));
+    }
+  bool any = false;
+  for (std::size_t k = 0; k < kBoxes; ++k) any |= from[k] <= to[k] && low_[0][k] <= high_[0][k];
+  return any;
 }
 
 bool SceneChange::may_meet(glm::vec3 from, glm::vec3 to, float radius) const {
   const glm::vec3 along = to - from;
   const float length2 = std::max(glm::dot(along, along), std::numeric_limits<float>::min());
-  return std::any_of(spheres_.begin(), spheres_.end(), [&](const Sphere& sphere) {
+  const auto meets = [&](const Sphere& sphere) {
     const glm::vec3 to_middle = sphere.middle - from;
     const glm::vec3 nearest = std::clamp(glm::dot(to_middle, along) / length2, 0.f, 1.f) * along - to_middle;
     const float reach = sphere.radius + radius;
     return glm::dot(nearest, nearest) <= reach * reach;
-  });
+  };
+  return !spheres_.empty() && meets(around_all_) && std::any_of(spheres_.begin(), spheres_.end(), meets);
 }
 
 bool SceneChange::may_meet(const Node& place, float radius, const HemisphereCells& cells,
@@ -283,7 +309,7 @@ bool SceneChange::may_meet(glm::vec3 place, float radius, const glm::vec3 (&tria
   if (glm::dot(a, across) < 0) across = -across;
   const double nearest = glm::dot(a, across) - radius;
   if (radius > 0 && !(nearest > 0)) return true;
-  return std::any_of(spheres_.begin(), spheres_.end(), [&](const Sphere& sphere) {
+  const auto meets = [&](const Sphere& sphere) {
     const glm::dvec3 to_middle(sphere.middle - place);
     const double distance = glm::length(to_middle);
     double reach = sphere.radius + radius + kShaftMargin * distance;
@@ -291,7 +317,8 @@ bool SceneChange::may_meet(glm::vec3 place, float radius, const glm::vec3 (&tria
     if (radius > 0) reach += radius * std::max(0.0, (distance + reach) / nearest - 1);
     return glm::dot(to_middle, across) >= -reach &&
            std::all_of(inward.begin(), inward.end(), [&](glm::dvec3 n) { return glm::dot(to_middle, n) >= -reach; });
-  });
+  };
+  return meets(around_all_) && std::any_of(spheres_.begin(), spheres_.end(), meets);
 }
 
 HemisphereCells::HemisphereCells(int bits) : bits_(bits) {

@@ -146,8 +146,8 @@ std::vector<char> survey_interior(const SceneGeometry& scene, const RayScene& ra
   return Surveyor(scene, rays, faces, seed).run();
 }
 
-void add_sides_that_see_indoors(const SceneGeometry& scene, const Faces& faces, const RayScene& rays, std::uint32_t seed,
-                                std::vector<char>& is_indoors) {
+void add_sides_that_see_indoors(const SceneGeometry& scene, const Faces& faces, const RayScene& rays,
+                                std::uint32_t seed, std::vector<char>& is_indoors) {
   std::vector<int> unseen;  // sides, as 2 * face + side
   for (int side = 0; side < 2 * static_cast<int>(faces.faces.size()); ++side) {
     const Face& face = faces.faces[static_cast<std::size_t>(side / 2)];
@@ -161,7 +161,8 @@ void add_sides_that_see_indoors(const SceneGeometry& scene, const Faces& faces, 
       const int face = unseen[i] / 2, side = unseen[i] % 2;
       const Face& own_face = faces.faces[static_cast<std::size_t>(face)];
       const SobolSequence points(
-          place_seed(seed, kSurveyStream, {own_face.corner[0] + own_face.corner[2], side == 0 ? own_face.normal : -own_face.normal}));
+          place_seed(seed, kSurveyStream,
+                     {own_face.corner[0] + own_face.corner[2], side == 0 ? own_face.normal : -own_face.normal}));
       Ray own[kRaysPerSlot];
       Hit hits[kRaysPerSlot];
       for (std::uint32_t k = 0; k < kRaysPerSlot; ++k) {

@@ -144,7 +144,7 @@ TEST(Edit, AMovedLampIsThatOfAFreshSolve) {
 }
 
 TEST(Edit, AnObjectMovedOutdoorsBeforeAnOpeningIsThatOfAFreshSolve) {
-  const SolveFacts facts = expect_fresh([](SceneGeometry& scene) { move_box(scene, 2, {0.5, 0.7, -1}); });
+  const SolveFacts facts = expect_fresh([](SceneGeometry& scene) { move_box(scene, 2, {0.5, 0.7, 0}); });
   EXPECT_GT(facts.kept_node_rows, kRowsThatStay * facts.node_count);
 }
 

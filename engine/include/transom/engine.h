@@ -56,7 +56,7 @@ struct SolveFacts {
   TransferDefects defects;
   int cluster_count = 0;  ///< of patches, for interreflection
   int panel_count = 0, panel_bin_count = 0;
-  std::size_t link_bytes = 0;                   ///< of what is kept of how nodes see patches
+  std::size_t link_bytes = 0;  ///< of what is kept of how nodes see patches
   /// Rows begun from those of another engine: but for what lies behind openings, and for single rays, they are its own.
   int kept_patch_rows = 0, kept_node_rows = 0;
 };
@@ -147,12 +147,12 @@ class Engine {
   /// What an engine of an earlier state of the scene found, as far as it is valid.
   struct Known {
     const Engine* engine = nullptr;
-    std::unique_ptr<SceneChange> change;                        // null without an engine
-    bool has_openings = false;                                  // all faces of openings and their glazing are the same
-    bool has_same_patches = false;                              // no face has changed, and patches have the same numbers
-    bool has_same_nodes = false;                                // and nodes have
+    std::unique_ptr<SceneChange> change;  // null without an engine
+    bool has_openings = false;            // all faces of openings and their glazing are the same
+    bool has_same_patches = false;        // no face has changed, and patches have the same numbers
+    bool has_same_nodes = false;          // and nodes have
     std::unordered_multimap<std::uint32_t, int> nodes_by_seed;
-    std::vector<int> node;                                      // its number of each node here, or -1
+    std::vector<int> node;  // its number of each node here, or -1
     bool has_same_faces() const { return change && change->is_none(); }
     int patch(int slot) const;  // its number of the patch of a slot here, or -1
     std::vector<Share> slots_of(std::vector<Share> patches, const std::vector<Share>& unlit) const;

@@ -29,9 +29,9 @@ class PointLinks {
   struct Known {
     const PointLinks* links = nullptr;
     const SceneChange* change = nullptr;  ///< between that state and this one
-    std::vector<int> point;         ///< its number of each point here, or -1
-    bool has_same_points = false;   ///< all of them, in the same order, and no face has changed
-    bool has_same_glazing = false;  ///< else only what is seen without looking through an opening is of use
+    std::vector<int> point;               ///< its number of each point here, or -1
+    bool has_same_points = false;         ///< all of them, in the same order, and no face has changed
+    bool has_same_glazing = false;        ///< else only what is seen without looking through an opening is of use
   };
 
   /// Links the patches of these slots to all points, as far as memory allows. known: what need not be found again.
@@ -64,9 +64,9 @@ class PointLinks {
   struct KnownPoints {
     KnownPoints(const Known& known, const Link* link);
     const Known& known;
-    const Link* link;                          // null: none is known
+    const Link* link;                           // null: none is known
     std::vector<std::uint8_t> seen, is_glazed;  // by the numbers of points there
-    int number(int point) const;               // -1: to be found anew
+    int number(int point) const;                // -1: to be found anew
   };
   struct LitPatch {
     std::shared_ptr<const Link> link;
@@ -78,7 +78,7 @@ class PointLinks {
   };
   std::size_t bytes_of(const Link& link) const;
   glm::vec3 exposed_middle(int slot) const;
-  std::shared_ptr<const Link> known_link(int slot, const Known& known) const;
+  std::shared_ptr<const Link> known_link(int slot, glm::vec3 middle, const Known& known) const;
   std::vector<std::shared_ptr<const Link>> links_of(const std::vector<int>& slots, const Known& known) const;
   std::shared_ptr<const Link> link(int slot, const Known& known) const;
   void link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points, const KnownPoints& known) const;

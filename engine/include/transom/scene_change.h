@@ -1,6 +1,7 @@
 /// @file What an edit leaves of a scene: which faces and slots stay, and which rays can tell the difference.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <vector>
@@ -14,8 +15,8 @@ namespace transom {
 class HemisphereCells;
 
 /// Two states of a scene compared. A face stays if it is in the same place with the same cells, of whatever material
-/// and number, and is as solid as it was; a slot stays with its face. What has changed is all in a few boxes: a ray that
-/// meets none of them meets the same places in both states.
+/// and number, and is as solid as it was; a slot stays with its face. What has changed is all in a few boxes: a ray
+/// that meets none of them meets the same places in both states.
 ///
 /// Slots are numbered as in the later state where nothing else is said.
 class SceneChange {
@@ -54,11 +55,11 @@ class SceneChange {
  private:
   static constexpr std::size_t kBoxes = 16, kSpheres = 32;  // at most; they hold all that has changed
   struct Box {
-    glm::vec3 low, high;
+    glm::vec3 low{Ray::kInfinity}, high{-Ray::kInfinity};
   };
   struct Sphere {
-    glm::vec3 middle;
-    float radius;
+    glm::vec3 middle{0};
+    float radius = 0;
   };
   void match_faces(const LightMesh& before, const LightMesh& after);
   void match_clusters(const LightMesh& before, const LightMesh& after);
@@ -68,8 +69,10 @@ class SceneChange {
   int elements_per_slot_;
   bool is_none_ = false;
   std::vector<int> face_before_, face_after_, slot_before_, slot_after_;
-  std::vector<Box> boxes_;
-  std::vector<Sphere> spheres_;  // around the boxes
+  Box all_;  // that has changed
+  Sphere around_all_;
+  std::array<std::array<float, kBoxes>, 3> low_, high_;  // of the boxes, by axis; those that are not needed are empty
+  std::vector<Sphere> spheres_;                          // around the boxes
 };
 
 /// The hemisphere around +z in the cells that sampling fills evenly: equal squares of the unit square, as
