@@ -32,6 +32,7 @@ Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions option
 Engine::Engine(const Engine& solved, SceneGeometry scene)
     : scene_(std::move(scene)), sky_bins_(solved.sky_bins_), options_(solved.options_) {
   options_.maximum_edge_m = solved.facts_.maximum_edge_m;
+  options_.outdoor_edge_m = solved.facts_.outdoor_edge_m;
   solve(&solved);
 }
 
@@ -42,14 +43,14 @@ void Engine::solve(const Engine* solved) {
     faces_ = make_faces(scene_);
     rays_ = std::make_unique<RayScene>(faces_, scene_.materials, scene_.openings);
     sky_index_ = std::make_unique<SkyBinIndex>(sky_bins_);
-    const std::vector<char> is_indoors =
-        survey_interior(scene_, *rays_, faces_, hash_seed(options_.seed, kSurveyStream));
+    std::vector<char> is_indoors = survey_interior(scene_, *rays_, faces_, hash_seed(options_.seed, kSurveyStream));
     check_overlaps(faces_, is_indoors, *rays_);
-    edges_ = solved && are_same_places(faces_, solved->faces_)
-                 ? solved->edges_
-                 : choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.target_patch_count);
-    facts_.maximum_edge_m = *std::min_element(edges_.begin(), edges_.end());
-    mesh_ = std::make_unique<LightMesh>(faces_, edges_, options_.elements_per_edge, clusters());
+    add_sides_that_see_indoors(scene_, faces_, *rays_, options_.seed, is_indoors);
+    const std::vector<float> edges =
+        choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.outdoor_edge_m, options_.target_patch_count);
+    facts_.maximum_edge_m = *std::min_element(edges.begin(), edges.end());
+    facts_.outdoor_edge_m = *std::max_element(edges.begin(), edges.end());
+    mesh_ = std::make_unique<LightMesh>(faces_, edges, options_.elements_per_edge, clusters(edges));
     panels_ = std::make_unique<Panels>(faces_, scene_.materials, scene_.openings);
     gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_, *panels_);
     const float element_edge = facts_.maximum_edge_m / static_cast<float>(options_.elements_per_edge);
@@ -67,7 +68,7 @@ void Engine::solve(const Engine* solved) {
     mark_interior();
     find_unseen_patches(known);
     check_closed();
-    known.has_same_patches = known.has_surroundings && slot_of_patch_ == solved->slot_of_patch_;
+    known.has_same_patches = known.has_same_faces() && slot_of_patch_ == solved->slot_of_patch_;
   }
   {
     const TracePhase phase(trace_, "transfer");
@@ -97,8 +98,8 @@ void Engine::solve(const Engine* solved) {
 }
 
 // Small faces taken together, where each for itself would be too many.
-FaceClusters Engine::clusters() const {
-  const std::vector<char> is_small = find_small_faces(faces_, scene_.materials, edges_, options_.target_patch_count);
+FaceClusters Engine::clusters(const std::vector<float>& edges) const {
+  const std::vector<char> is_small = find_small_faces(faces_, scene_.materials, edges, options_.target_patch_count);
   return {faces_, is_small, facts_.maximum_edge_m, options_.target_patch_count / 2,
           options_.elements_per_edge * options_.elements_per_edge};
 }
@@ -107,17 +108,24 @@ Engine::Known Engine::known_from(const Engine* solved) const {
   Known known;
   known.engine = solved;
   if (!solved) return known;
-  known.has_surroundings = are_same_places(faces_, solved->faces_) && mesh_->has_same_cells(*solved->mesh_);
-  known.has_openings = known.has_surroundings;
-  for (std::size_t f = 0; f < faces_.faces.size() && known.has_openings; ++f) {
-    const int own = scene_.materials[faces_.faces[f].material].opening,
-              other = solved->scene_.materials[solved->faces_.faces[f].material].opening;
-    known.has_openings =
-        own < 0 ? other < 0
-                : other >= 0 && scene_.openings[own].transmittance == solved->scene_.openings[other].transmittance &&
-                      scene_.openings[own].panel == solved->scene_.openings[other].panel;
-  }
+  known.change = std::make_unique<SceneChange>(*solved->mesh_, *mesh_);
+  const std::vector<int> own = opening_faces(), others = solved->opening_faces();
+  known.has_openings = std::equal(own.begin(), own.end(), others.begin(), others.end(), [&](int face, int other) {
+    const OpeningGroup &a = scene_.openings[opening_of(face)], &b = solved->scene_.openings[solved->opening_of(other)];
+    return known.change->face_before(face) == other && a.transmittance == b.transmittance && a.panel == b.panel;
+  });
   return known;
+}
+
+int Engine::opening_of(int face) const {
+  return scene_.materials[faces_.faces[face].material].opening;
+}
+
+std::vector<int> Engine::opening_faces() const {
+  std::vector<int> faces;
+  for (int face = 0; face < static_cast<int>(faces_.faces.size()); ++face)
+    if (opening_of(face) >= 0) faces.push_back(face);
+  return faces;
 }
 
 Engine::~Engine() = default;
@@ -135,6 +143,14 @@ std::vector<Share> Engine::to_patches(const std::vector<Share>& slots) const {
     if (patch_of_slot_[share.index] >= 0) patches.push_back({patch_of_slot_[share.index], share.weight});
   merge_shares(patches);
   return patches;
+}
+
+// Those of the slots that are no patches.
+std::vector<Share> Engine::unlit_of(const std::vector<Share>& slots) const {
+  std::vector<Share> unlit;
+  for (const Share& share : slots)
+    if (patch_of_slot_[share.index] < 0) unlit.push_back(share);
+  return unlit;
 }
 
 void Engine::assemble_transfer(const Known& known) {
@@ -156,7 +172,7 @@ void Engine::assemble_transfer(const Known& known) {
     row_sums[p] = is_interior_[p] ? 1.f : 1.f - row.around->escaped;
     is_behind_openings[p] = is_interior_[p] && row.around->escaped == 0;
     through_.append(to_patches(row.beyond->through));
-    facts_.kept_patch_rows += known.has_surroundings && known.engine->patch_of_slot_[slot_of_patch_[p]] >= 0;
+    facts_.kept_patch_rows += known.patch(slot_of_patch_[p]) >= 0;
     patch_sky_.append(row.beyond->sky);
   }
   receivers_ = beam_light_->receivers(slot_of_patch_, std::move(is_behind_openings));

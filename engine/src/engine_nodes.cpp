@@ -1,6 +1,5 @@
 // The nodes of an engine: where light is gathered to be shown, the more densely the more it changes.
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "streams.h"
@@ -53,7 +52,8 @@ struct Engine::TrialLight {
 struct Engine::NodeTrial {
   std::vector<GatherRow> rows;
   std::vector<TrialLight> lights;
-  std::vector<std::vector<Share>> own_sky;  // seen without looking through an opening
+  std::vector<std::vector<Share>> own_sky;               // seen without looking through an opening
+  std::vector<std::vector<Share>> unlit, unlit_through;  // slots that are no patches
   float longest_edge;
 
   // Larger for parts that are a smaller part of a picture.
@@ -90,25 +90,45 @@ std::vector<Engine::TrialLight> Engine::trial_lights() const {
   return lights;
 }
 
-// What a node sees without looking through openings, of patches alone; as the other engine knows it, if it does.
+// What a node sees without looking through openings, by slot; from what the other engine knows, if it does.
 GatherRow Engine::surroundings_of_node(const Node& node, int known_node, const Known& known) const {
   GatherRow row;
   if (known_node >= 0) {
     const auto other = static_cast<std::size_t>(known_node);
     const NodeRows& rows = *known.engine->node_rows_;
-    row.reached = rows.patches.row(other);
-    for (Share& share : row.reached) share.index = known.engine->slot_of_patch_[share.index];
+    row.reached = known.slots_of(rows.patches.row(other), rows.unlit.row(other));
     row.sky = rows.sky.row(other);
-    row.near = rows.near.row(other);
+    row.near = known.change->renumbered_elements(rows.near.row(other));
     row.exposure = rows.exposure[other];
     row.harmonic_distance = rows.harmonic_distance[other];
-  } else {
-    row = gatherer_->surroundings_of_point(node, options_.node_samples, node_seed(node));
+    row.inverse_distance = rows.inverse_distance[other];
+    if (known.change->is_none()) return row;
+    return gatherer_->surroundings_of_point(node, options_.node_samples, node_seed(node), std::move(row),
+                                            *known.engine->gatherer_, *known.change);
   }
-  row.reached = to_patches(row.reached);
-  std::erase_if(row.near,
-                [&](const Share& share) { return patch_of_slot_[share.index / mesh_->elements_per_slot()] < 0; });
-  return row;
+  return gatherer_->surroundings_of_point(node, options_.node_samples, node_seed(node));
+}
+
+// The slots here of shares of patches and of other slots there.
+std::vector<Share> Engine::Known::slots_of(std::vector<Share> patches, const std::vector<Share>& unlit) const {
+  for (Share& share : patches) share.index = engine->slot_of_patch_[share.index];
+  patches.insert(patches.end(), unlit.begin(), unlit.end());
+  return change->renumbered(std::move(patches));
+}
+
+// What a node sees through openings, and all that it sees of the sky, added to its surroundings, by slot.
+void Engine::look_through_openings(const Node& node, int known_node, const Known& known, GatherRow& row) const {
+  if (known_node >= 0 && known.has_openings) {
+    const auto other = static_cast<std::size_t>(known_node);
+    const NodeRows& rows = *known.engine->node_rows_;
+    if (row.exposure == rows.exposure[other] && row.sky == rows.sky.row(other) &&
+        !gatherer_->may_see_through_openings(node, *known.change)) {
+      row.sky = known.engine->node_sky_.row(other);
+      row.through = known.slots_of(known.engine->node_through_.row(other), rows.unlit_through.row(other));
+      return;
+    }
+  }
+  gatherer_->look_through_openings(node, options_.node_samples, node_seed(node), row);
 }
 
 // Gathers at the nodes that have been added. Their samples depend on their places alone.
@@ -116,7 +136,8 @@ void Engine::gather_new_nodes(NodeTrial& trial, int first_part, Known& known) {
   const std::vector<Node>& nodes = nodes_->nodes();
   const std::size_t first = trial.rows.size(), count = nodes.size() - first;
   trial.rows.resize(nodes.size());
-  trial.own_sky.resize(nodes.size());
+  for (std::vector<std::vector<Share>>* rows : {&trial.own_sky, &trial.unlit, &trial.unlit_through})
+    rows->resize(nodes.size());
   for (TrialLight& light : trial.lights) light.at_nodes.resize(nodes.size());
   known.node.resize(nodes.size(), -1);
   std::vector<char> is_exposed(count);
@@ -129,13 +150,11 @@ void Engine::gather_new_nodes(NodeTrial& trial, int first_part, Known& known) {
     GatherRow& row = trial.rows[i];
     row = surroundings_of_node(nodes[i], known.node[i], known);
     trial.own_sky[i] = row.sky;
-    if (known.node[i] >= 0 && known.has_openings && known.has_same_patches) {
-      row.sky = known.engine->node_sky_.row(static_cast<std::size_t>(known.node[i]));
-      row.through = known.engine->node_through_.row(static_cast<std::size_t>(known.node[i]));
-    } else {
-      gatherer_->look_through_openings(nodes[i], options_.node_samples, node_seed(nodes[i]), row);
-      row.through = to_patches(row.through);
-    }
+    look_through_openings(nodes[i], known.node[i], known, row);
+    trial.unlit[i] = unlit_of(row.reached);
+    trial.unlit_through[i] = unlit_of(row.through);
+    row.reached = to_patches(row.reached);
+    row.through = to_patches(row.through);
     is_exposed[k] = row.exposure >= kExposedNode;
     float sky = 0;
     for (const Share& share : row.sky) sky += share.weight;
@@ -167,6 +186,7 @@ void Engine::resolve_near_light(const NodeTrial& trial) {
   parallel_indices(node_count, kGrain, [&](std::size_t i) {
     for (const Share& share : trial.rows[i].near) {
       const int patch = patch_of_slot_[share.index / per_slot];
+      if (patch < 0) continue;
       const NodeShares& nodes = at_element[static_cast<std::size_t>(patch * per_slot + share.index % per_slot)];
       if (nodes.count == 0) continue;
       for (int k = 0; k < nodes.count; ++k) rows[i].push_back({nodes.node[k], share.weight * nodes.weight[k]});
@@ -225,15 +245,12 @@ void Engine::gather_nodes(Known& known) {
     if (patch_reflectance_[p] != glm::vec3(0) && !mesh_->is_cluster(slot_of_patch_[p]))  // a cluster shows its patch
       slots.push_back(slot_of_patch_[p]);
   std::sort(slots.begin(), slots.end());  // not in the order in which patches are found
-  // Rows of the other engine are of use if it had all patches of this one: else it left out what they are seen by.
-  if (known.has_surroundings && known.engine->nodes_ &&
-      std::all_of(slot_of_patch_.begin(), slot_of_patch_.end(),
-                  [&](int slot) { return known.engine->patch_of_slot_[slot] >= 0; }))
+  if (known.engine && known.engine->nodes_)
     for (std::size_t i = 0; i < known.engine->nodes_->nodes().size(); ++i)
       known.nodes_by_seed.emplace(node_seed(known.engine->nodes_->nodes()[i]), static_cast<int>(i));
   const float edge = facts_.maximum_edge_m;
   nodes_ = std::make_unique<NodeField>(*mesh_, *rays_, slots, kThin * edge);
-  NodeTrial trial{{}, trial_lights(), {}, edge};
+  NodeTrial trial{{}, trial_lights(), {}, {}, {}, edge};
   gather_new_nodes(trial, 0, known);
   for (TrialLight& light : trial.lights) {
     double sum = 0, count = 0;
@@ -266,7 +283,7 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
   facts_.node_count = static_cast<int>(trial.rows.size());
   facts_.kept_node_rows =
       static_cast<int>(std::count_if(known.node.begin(), known.node.end(), [](int node) { return node >= 0; }));
-  known.has_same_nodes = !known.nodes_by_seed.empty() && nodes_->nodes() == known.engine->nodes_->nodes();
+  known.has_same_nodes = known.has_same_faces() && nodes_->nodes() == known.engine->nodes_->nodes();
   const auto found = std::make_shared<NodeRows>();
   SparseRows all;
   for (std::size_t i = 0; i < trial.rows.size(); ++i) {
@@ -274,8 +291,11 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
     found->patches.append(row.reached);
     found->sky.append(trial.own_sky[i]);
     found->near.append(row.near);
+    found->unlit.append(trial.unlit[i]);
+    found->unlit_through.append(trial.unlit_through[i]);
     found->exposure.push_back(row.exposure);
     found->harmonic_distance.push_back(row.harmonic_distance);
+    found->inverse_distance.push_back(row.inverse_distance);
     node_sky_.append(row.sky);
     node_through_.append(row.through);
     std::vector<Share> patches = row.reached;
@@ -290,18 +310,16 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
 void Engine::link_nodes(const Known& known) {
   links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes());
   PointLinks::Known known_links;
-  if (known.has_surroundings && known.engine->links_)
-    known_links = {known.engine->links_.get(), known.node, known.has_same_nodes, known.has_openings};
+  if (known.engine && known.engine->links_)
+    known_links = {known.engine->links_.get(), known.change.get(), known.node, known.has_same_nodes,
+                   known.has_openings};
   links_->prepare(beam_slots(), known_links);
   facts_.link_bytes = links_->byte_count();
 }
 
 // Samples of a node depend on where it is alone, so that another object in the room does not change them.
 std::uint32_t Engine::node_seed(const Node& node) const {
-  std::uint32_t seed = hash_seed(options_.seed, kNodeStream);
-  for (const glm::vec3 v : {node.position, node.normal})
-    for (int axis = 0; axis < 3; ++axis) seed = hash_seed(seed, std::bit_cast<std::uint32_t>(v[axis]));
-  return seed;
+  return place_seed(options_.seed, kNodeStream, node);
 }
 
 }  // namespace transom

@@ -81,8 +81,11 @@ FaceClusters::FaceClusters(const Faces& faces, const std::vector<char>& is_small
   area_.resize(static_cast<std::size_t>(count()));
   elements_.resize(static_cast<std::size_t>(count()) * per_cluster_);
   element_begin_.assign(elements_.size() + 1, sides_.size());
-  area_before_.push_back(0);
-  for (const int side : sides_) area_before_.push_back(area_before_.back() + faces.faces[side / 2].area);
+  // Sums begin anew with each cluster, so that they do not depend on the others.
+  area_up_to_.resize(sides_.size());
+  for (int c = 0; c < count(); ++c)
+    for (std::size_t i = begin_[c]; i < begin_[c + 1]; ++i)
+      area_up_to_[i] = area_before(i, begin_[c]) + faces.faces[sides_[i] / 2].area;
   parallel_indices(static_cast<std::size_t>(count()), 16,
                    [&](std::size_t c) { find_elements(faces, static_cast<int>(c)); });
 }
@@ -125,10 +128,10 @@ void FaceClusters::find_clusters(const Faces& faces, const std::vector<char>& is
 // Parts of about equal area along the curve. A part's point is the middle of the face nearest to the middle of all.
 void FaceClusters::find_elements(const Faces& faces, int cluster) {
   const std::size_t first = begin_[cluster], last = begin_[cluster + 1];
-  const double before = area_before_[first], all = area_before_[last] - before;
+  const double all = area_up_to_[last - 1];
   area_[cluster] = static_cast<float>(all);
   const auto part_of = [&](std::size_t i) {
-    const double middle = 0.5 * (area_before_[i] + area_before_[i + 1]) - before;
+    const double middle = 0.5 * (area_before(i, first) + area_up_to_[i]);
     return std::clamp(static_cast<int>(middle / all * per_cluster_), 0, per_cluster_ - 1);
   };
   std::size_t end = first;
@@ -154,23 +157,24 @@ void FaceClusters::find_elements(const Faces& faces, int cluster) {
   }
 }
 
-int FaceClusters::sample_between(std::size_t first, std::size_t last, float& u) const {
-  const double before = area_before_[first], wanted = before + u * (area_before_[last] - before);
-  const auto after = std::upper_bound(area_before_.begin() + static_cast<std::ptrdiff_t>(first) + 1,
-                                      area_before_.begin() + static_cast<std::ptrdiff_t>(last), wanted);
-  const auto i = static_cast<std::size_t>(after - area_before_.begin()) - 1;
-  const double own = area_before_[i + 1] - area_before_[i];
-  u = static_cast<float>(std::clamp((wanted - area_before_[i]) / own, 0.0, 0.9999999));
+int FaceClusters::sample_between(int cluster, std::size_t first, std::size_t last, float& u) const {
+  const std::size_t begin = begin_[cluster];
+  const double before = area_before(first, begin), wanted = before + u * (area_up_to_[last - 1] - before);
+  const auto sampled = std::upper_bound(area_up_to_.begin() + static_cast<std::ptrdiff_t>(first),
+                                        area_up_to_.begin() + static_cast<std::ptrdiff_t>(last) - 1, wanted);
+  const auto i = static_cast<std::size_t>(sampled - area_up_to_.begin());
+  const double start = area_before(i, begin), own = area_up_to_[i] - start;
+  u = static_cast<float>(std::clamp((wanted - start) / own, 0.0, 0.9999999));
   return sides_[i];
 }
 
 int FaceClusters::sample_side(int cluster, float& u) const {
-  return sample_between(begin_[cluster], begin_[cluster + 1], u);
+  return sample_between(cluster, begin_[cluster], begin_[cluster + 1], u);
 }
 
 int FaceClusters::sample_side(int cluster, int element, float& u) const {
   const std::size_t first = element_begin_[cluster * per_cluster_ + element];
-  return sample_between(first, element_begin_[cluster * per_cluster_ + element + 1], u);
+  return sample_between(cluster, first, element_begin_[cluster * per_cluster_ + element + 1], u);
 }
 
 std::vector<char> find_small_faces(const Faces& faces, const std::vector<Material>& materials,

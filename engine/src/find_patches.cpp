@@ -61,23 +61,47 @@ std::vector<int> Engine::first_wave() const {
 }
 
 Engine::PatchRow Engine::patch_row(int slot, const Known& known) const {
-  const int known_patch = known.has_surroundings ? known.engine->patch_of_slot_[slot] : -1;
+  const int known_patch = known.patch(slot);
   const PatchRow* known_row = known_patch >= 0 ? &known.engine->patch_rows_[known_patch] : nullptr;
-  if (known_row && known.has_openings) return *known_row;
-  const std::uint32_t seed = hash_seed(options_.seed, hash_seed(kPatchStream, static_cast<std::uint64_t>(slot)));
+  if (known_row && known.has_openings && known.has_same_faces()) return *known_row;
   PatchRow row;
-  if (known_row) {
-    row.around = known_row->around;
-  } else {
-    row.around =
-        std::make_shared<const GatherRow>(gatherer_->surroundings_of_patch(slot, options_.patch_samples, seed));
-  }
+  row.around = surroundings_of_patch(slot, known_row ? known_row->around : nullptr, known);
   GatherRow beyond;
   beyond.exposure = row.around->exposure;
-  beyond.sky = row.around->sky;
-  gatherer_->look_through_openings(slot, options_.patch_samples, seed, beyond);
+  if (known_row && known.has_openings && row.around->exposure == known_row->around->exposure &&
+      row.around->sky == known_row->around->sky && !gatherer_->may_see_through_openings(slot, *known.change)) {
+    beyond.sky = known_row->beyond->sky;
+    beyond.through = known.change->renumbered(known_row->beyond->through);
+  } else {
+    beyond.sky = row.around->sky;
+    gatherer_->look_through_openings(slot, options_.patch_samples, patch_seed(slot), beyond);
+  }
   row.beyond = std::make_shared<const GatherRow>(std::move(beyond));
   return row;
+}
+
+// What a patch sees without looking through openings, from what it saw in another state of the scene, if that is known.
+std::shared_ptr<const GatherRow> Engine::surroundings_of_patch(int slot,
+                                                               const std::shared_ptr<const GatherRow>& known_row,
+                                                               const Known& known) const {
+  if (known_row && known.has_same_faces()) return known_row;
+  const std::uint32_t seed = patch_seed(slot);
+  if (!known_row)
+    return std::make_shared<const GatherRow>(gatherer_->surroundings_of_patch(slot, options_.patch_samples, seed));
+  GatherRow row = *known_row;
+  row.reached = known.change->renumbered(row.reached);
+  return std::make_shared<const GatherRow>(gatherer_->surroundings_of_patch(
+      slot, options_.patch_samples, seed, std::move(row), *known.engine->gatherer_, *known.change));
+}
+
+// Samples of a patch depend on where it is alone.
+std::uint32_t Engine::patch_seed(int slot) const {
+  return place_seed(options_.seed, kPatchStream, {mesh_->middle_of(slot).position, mesh_->normal_of(slot)});
+}
+
+int Engine::Known::patch(int slot) const {
+  const int before = change ? change->slot_before(slot) : -1;
+  return before >= 0 ? engine->patch_of_slot_[before] : -1;
 }
 
 // Rows wave by wave: what a patch sees becomes a patch in the next wave, until nothing new is seen.

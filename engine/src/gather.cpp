@@ -4,8 +4,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "hemisphere.h"
 #include "transom/panels.h"
 #include "transom/sampling.h"
+#include "transom/scene_change.h"
 
 namespace transom {
 namespace {
@@ -48,17 +50,12 @@ Gatherer::Gatherer(const LightMesh& mesh, const RayScene& rays, const std::vecto
 }
 
 template <typename OriginOf>
-void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, bool tells_near,
-                                 GatherRow& row) const {
+GatherRow Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, bool tells_near) const {
   const SobolSequence points(seed);
   const std::vector<std::uint32_t>& order = coherent_order(count);
   Ray rays[kBlock];
-  Hit hits[kBlock];
-  int buried = 0, escaped = 0;
-  double inverse_distance = 0;
-  std::vector<int> slots;  // one a ray
-  slots.reserve(static_cast<std::size_t>(count));
-  std::vector<int> open_bins;
+  HemisphereTally tally;
+  tally.slots.reserve(static_cast<std::size_t>(count));
   auto next = order.begin();
   for (int begin = 0; begin < count; begin += kBlock) {
     const int size = std::min(kBlock, count - begin);
@@ -68,38 +65,31 @@ void Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint
       const Origin origin = origin_of(glm::vec2(u.z, u.w));
       rays[i] = {origin.position, frame_from_normal(origin.normal) * sample_cosine_hemisphere({u.x, u.y})};
     }
-    rays_.intersect(RayScene::What::kAll, {rays, static_cast<std::size_t>(size)},
-                    {hits, static_cast<std::size_t>(size)}, RayScene::Order::kCoherent);
-    for (int i = 0; i < size; ++i) {
+    add_hits({rays, static_cast<std::size_t>(size)}, tells_near, tally);
+  }
+  return std::move(tally).row(count, mesh_.faces().extent);
+}
+
+// Casts rays and counts what they meet.
+void Gatherer::add_hits(std::span<const Ray> rays, bool tells_near, HemisphereTally& tally) const {
+  Hit hits[kBlock];
+  for (std::size_t begin = 0; begin < rays.size(); begin += kBlock) {
+    const std::span<const Ray> block = rays.subspan(begin, std::min<std::size_t>(kBlock, rays.size() - begin));
+    rays_.intersect(RayScene::What::kAll, block, {hits, block.size()}, RayScene::Order::kCoherent);
+    for (std::size_t i = 0; i < block.size(); ++i) {
       if (hits[i].face < 0) {
-        ++escaped;
-        open_bins.push_back(sky_(rays[i].direction));
+        tally.bins.push_back(sky_(block[i].direction));
       } else if (mesh_.faces().is_inside_solid(hits[i].face, hits[i].side)) {
-        ++buried;
+        ++tally.buried;
       } else {
         const int slot = mesh_.slot_at(hits[i]);
-        slots.push_back(slot);
+        tally.slots.push_back(slot);
         if (tells_near && hits[i].t < near_distance_[static_cast<std::size_t>(slot)])
-          row.near.push_back({mesh_.element_at(hits[i]), 1});
-        inverse_distance += 1 / std::max(hits[i].t, mesh_.faces().ray_offset());
+          tally.near.push_back(mesh_.element_at(hits[i]));
+        tally.add_distance(hits[i].t, mesh_.faces());
       }
     }
   }
-  const int exposed = count - buried;
-  row.exposure = static_cast<float>(exposed) / static_cast<float>(count);
-  if (exposed == 0) return;
-  const float share = 1 / static_cast<float>(exposed);
-  std::sort(slots.begin(), slots.end());
-  for (auto first = slots.begin(); first != slots.end();) {
-    const auto last = std::find_if(first, slots.end(), [&](int slot) { return slot != *first; });
-    row.reached.push_back({*first, share * static_cast<float>(last - first)});
-    first = last;
-  }
-  merge_shares(row.near);
-  for (Share& near : row.near) near.weight *= share;
-  for (const int bin : open_bins) row.sky.push_back({bin, kPi * share});
-  row.escaped = static_cast<float>(escaped) * share;
-  row.harmonic_distance = inverse_distance > 0 ? static_cast<float>(exposed / inverse_distance) : Ray::kInfinity;
 }
 
 template <typename OriginOf>
@@ -209,13 +199,8 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
 }
 
 GatherRow Gatherer::surroundings_of_point(const Node& point, GatherSamples samples, std::uint32_t seed) const {
-  GatherRow row;
-  gather_hemisphere(
-      [&](glm::vec2) {
-        return Origin{point.position, point.normal};
-      },
-      samples.hemisphere, seed, true, row);
-  return row;
+  const auto origin_of = [&](glm::vec2) { return Origin{point.position, point.normal}; };
+  return gather_hemisphere(origin_of, samples.hemisphere, seed, true);
 }
 
 void Gatherer::look_through_openings(const Node& point, GatherSamples samples, std::uint32_t seed,
@@ -235,9 +220,7 @@ auto Gatherer::places_on(int slot) const {
 }
 
 GatherRow Gatherer::surroundings_of_patch(int slot, GatherSamples samples, std::uint32_t seed) const {
-  GatherRow row;
-  gather_hemisphere(places_on(slot), samples.hemisphere, seed, false, row);
-  return row;
+  return gather_hemisphere(places_on(slot), samples.hemisphere, seed, false);
 }
 
 void Gatherer::look_through_openings(int slot, GatherSamples samples, std::uint32_t seed, GatherRow& row) const {
@@ -245,6 +228,93 @@ void Gatherer::look_through_openings(int slot, GatherSamples samples, std::uint3
   gather_openings({middle.position, middle.normal}, places_on(slot), samples.openings, seed, row);
   merge_shares(row.through);
   merge_shares(row.sky);
+}
+
+// Casts those rays again that may meet what has changed, in both states. False: their answers do not go together.
+template <typename OriginOf>
+bool Gatherer::gather_again(const OriginOf& origin_of, const Node& middle, float radius, int count, std::uint32_t seed,
+                            bool tells_near, const Gatherer& before, const SceneChange& change, GatherRow& row) const {
+  const HemisphereCells& cells = HemisphereCells::of(coherent_bits(count));
+  thread_local std::vector<char> is_met;
+  thread_local std::vector<Ray> rays;
+  rays.clear();
+  if (radius < Ray::kInfinity) {
+    if (!change.may_meet(middle, radius, cells, is_met)) return true;
+  } else {
+    is_met.assign(static_cast<std::size_t>(cells.count()), 1);
+  }
+  const SobolSequence points(seed);
+  const std::vector<std::uint32_t>& order = coherent_order(count);
+  const std::size_t per_cell = order.size() / is_met.size();
+  for (std::size_t begin = 0; begin < order.size(); begin += per_cell) {
+    const glm::ivec2 cell = points.cell2(order[begin], cells.bits());
+    if (!is_met[static_cast<std::size_t>(cell.y * cells.per_axis() + cell.x)]) continue;
+    for (std::size_t k = begin; k < begin + per_cell; ++k) {
+      if (order[k] >= static_cast<std::uint32_t>(count)) continue;
+      const glm::vec4 u = points.point4(order[k]);
+      const Origin origin = origin_of(glm::vec2(u.z, u.w));
+      const Ray ray{origin.position, frame_from_normal(origin.normal) * sample_cosine_hemisphere({u.x, u.y})};
+      if (change.may_meet(ray)) rays.push_back(ray);
+    }
+  }
+  if (rays.empty()) return true;
+  HemisphereTally lost, found;
+  before.add_hits(rays, tells_near, lost);
+  add_hits(rays, tells_near, found);
+  std::erase_if(lost.slots, [&](int& slot) { return (slot = change.slot_after(slot)) < 0; });
+  const int per_slot = mesh_.elements_per_slot();
+  std::erase_if(lost.near, [&](int& element) {
+    const int slot = change.slot_after(element / per_slot);
+    element = slot * per_slot + element % per_slot;
+    return slot < 0;
+  });
+  return recount(row, std::move(lost), std::move(found), count, mesh_.faces().extent);
+}
+
+GatherRow Gatherer::surroundings_of_point(const Node& point, GatherSamples samples, std::uint32_t seed, GatherRow known,
+                                          const Gatherer& before, const SceneChange& change) const {
+  const auto origin_of = [&](glm::vec2) { return Origin{point.position, point.normal}; };
+  if (gather_again(origin_of, point, 0, samples.hemisphere, seed, true, before, change, known)) return known;
+  return surroundings_of_point(point, samples, seed);
+}
+
+GatherRow Gatherer::surroundings_of_patch(int slot, GatherSamples samples, std::uint32_t seed, GatherRow known,
+                                          const Gatherer& before, const SceneChange& change) const {
+  if (gather_again(places_on(slot), mesh_.middle_of(slot), radius_of(slot), samples.hemisphere, seed, false, before,
+                   change, known))
+    return known;
+  return surroundings_of_patch(slot, samples, seed);
+}
+
+// Of a circle around the middle of a cell; of a cluster, which has no plane, infinity.
+float Gatherer::radius_of(int index) const {
+  if (mesh_.is_cluster(index)) return Ray::kInfinity;
+  const Slot slot = mesh_.slot(index);
+  const glm::vec3 middle = mesh_.middle_of(index).position;
+  float radius = 0;
+  for (const glm::vec2 corner : {glm::vec2(0, 0), glm::vec2(1, 0), glm::vec2(0, 1), glm::vec2(1, 1)}) {
+    if (corner == glm::vec2(1, 1) && !mesh_.grid(slot.face).is_quad) continue;
+    const glm::vec2 st = mesh_.cell_parameters(slot.face, slot.cell, corner);
+    radius = std::max(radius, glm::length(mesh_.lifted_position(slot.face, slot.side, st) - middle));
+  }
+  return radius;
+}
+
+bool Gatherer::may_see_through_openings(const Node& middle, float radius, const SceneChange& change) const {
+  return std::any_of(opening_triangles_.begin(), opening_triangles_.end(), [&](const OpeningTriangle& t) {
+    const bool is_ahead = std::any_of(t.corner, t.corner + 3, [&](const glm::vec3& corner) {
+      return glm::dot(corner - middle.position, middle.normal) >= 0;
+    });
+    return is_ahead && change.may_meet(middle.position, radius, t.corner);
+  });
+}
+
+bool Gatherer::may_see_through_openings(const Node& point, const SceneChange& change) const {
+  return may_see_through_openings(point, 0, change);
+}
+
+bool Gatherer::may_see_through_openings(int slot, const SceneChange& change) const {
+  return may_see_through_openings(mesh_.middle_of(slot), radius_of(slot), change);
 }
 
 GatherRow Gatherer::gather_at_point(const Node& point, GatherSamples samples, std::uint32_t seed) const {

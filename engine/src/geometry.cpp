@@ -211,15 +211,6 @@ glm::vec2 Face::parameters(int triangle, glm::vec2 b) const {
   return {static_cast<float>(std::clamp(s, 0.0, 1.0)), static_cast<float>(t)};
 }
 
-bool are_same_places(const Faces& a, const Faces& b) {
-  const auto is_same = [&](const Face& f, const Face& g) {
-    return std::equal(f.corner, f.corner + 4, g.corner) && f.is_quad == g.is_quad && f.source == g.source &&
-           std::equal(f.corner_normal, f.corner_normal + 4, g.corner_normal) && f.component == g.component;
-  };
-  return a.origin == b.origin && a.extent == b.extent && a.component_is_solid == b.component_is_solid &&
-         std::equal(a.faces.begin(), a.faces.end(), b.faces.begin(), b.faces.end(), is_same);
-}
-
 Faces make_faces(const SceneGeometry& scene) {
   scene.validate();
   glm::dvec3 low = scene.vertices[scene.faces[0].x], high = low;

@@ -71,6 +71,16 @@ PointLinks::PointLinks(const LightMesh& mesh, const RayScene& rays, const std::v
     ny_[i] = points[i].normal.y;
     nz_[i] = points[i].normal.z;
   }
+  for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
+    const std::span<const Node> block(points.data() + begin, std::min(kBlock, points.size() - begin));
+    glm::vec3 low = block[0].position, high = low;
+    for (const Node& point : block) {
+      low = glm::min(low, point.position);
+      high = glm::max(high, point.position);
+    }
+    block_middle_.push_back(0.5f * (low + high));
+    block_radius_.push_back(0.5f * glm::length(high - low));
+  }
 }
 
 // The middle of the elements of a patch that do not lie inside a solid, moved to the nearest of their own middles.
@@ -102,33 +112,43 @@ glm::vec3 PointLinks::exposed_middle(int slot_index) const {
       ->origin;
 }
 
-std::uint8_t PointLinks::Link::seen_of(int point) const {
-  const int wanted = point / static_cast<int>(kBlock);
-  const auto found = std::lower_bound(block.begin(), block.end(), wanted);
-  if (found == block.end() || *found != wanted) return 0;
-  return seen[static_cast<std::size_t>(found - block.begin()) * kBlock + static_cast<std::size_t>(point) % kBlock];
-}
-
 const float* PointLinks::Link::near_weight_of(int point, std::size_t element_count) const {
   const auto found = std::lower_bound(near_point.begin(), near_point.end(), point);
   if (found == near_point.end() || *found != point) return nullptr;
   return &near_weight[static_cast<std::size_t>(found - near_point.begin()) * element_count];
 }
 
+PointLinks::KnownPoints::KnownPoints(const Known& all_known, const Link* known_link)
+    : known(all_known), link(known_link) {
+  if (!link) return;
+  seen.assign(known.links->x_.size(), 0);
+  for (std::size_t k = 0; k < link->block.size(); ++k)
+    std::copy_n(link->seen.begin() + static_cast<std::ptrdiff_t>(k * kBlock), kBlock,
+                seen.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(link->block[k]) * kBlock));
+  is_glazed.assign(seen.size(), 0);
+  for (const int point : link->glazed_point) is_glazed[static_cast<std::size_t>(point)] = 1;
+}
+
 int PointLinks::KnownPoints::number(int point) const {
   const int known_point = link ? known.point[static_cast<std::size_t>(point)] : -1;
-  if (known_point < 0 || known.has_same_glazing) return known_point;
-  return std::binary_search(link->glazed_point.begin(), link->glazed_point.end(), known_point) ? -1 : known_point;
+  return known_point < 0 || known.has_same_glazing || !is_glazed[static_cast<std::size_t>(known_point)] ? known_point
+                                                                                                        : -1;
+}
+
+// The link of a patch in the other state, if the same part of the patch was exposed there.
+std::shared_ptr<const PointLinks::Link> PointLinks::known_link(int slot, glm::vec3 middle, const Known& known) const {
+  const int slot_before = known.links ? known.change->slot_before(slot) : -1;
+  if (slot_before < 0 || (!known.change->is_none() && known.links->exposed_middle(slot_before) != middle))
+    return nullptr;
+  const std::lock_guard lock(known.links->mutex_);
+  return known.links->links_[static_cast<std::size_t>(slot_before)];
 }
 
 std::shared_ptr<const PointLinks::Link> PointLinks::link(int slot_index, const Known& known) const {
-  std::shared_ptr<const Link> before;
-  if (known.links) {
-    const std::lock_guard lock(known.links->mutex_);
-    before = known.links->links_[slot_index];
-  }
+  const glm::vec3 middle = exposed_middle(slot_index);
+  const std::shared_ptr<const Link> before = known_link(slot_index, middle, known);
   if (before && known.has_same_points && (known.has_same_glazing || before->glazed_point.empty())) return before;
-  const glm::vec3 normal = mesh_.normal_of(slot_index), middle = exposed_middle(slot_index);
+  const glm::vec3 normal = mesh_.normal_of(slot_index);
   const float size2 = 2 * mesh_.slot_area(slot_index), size = std::sqrt(size2);
   auto link = std::make_shared<Link>();
   for (int e = slot_index * mesh_.elements_per_slot(); e < (slot_index + 1) * mesh_.elements_per_slot(); ++e)
@@ -149,15 +169,10 @@ std::shared_ptr<const PointLinks::Link> PointLinks::link(int slot_index, const K
       if (height[k] > 0 && cosine[k] > -size)
         (distance2[k] > kFar * kFar * size2 ? far_points : link->near_point).push_back(static_cast<int>(begin + k));
   }
-  const KnownPoints known_points{before.get(), known};
+  const KnownPoints known_points(known, before.get());
   link_far(*link, middle, far_points, known_points);
   weigh_far(*link, slot_index);
   link_near(*link, slot_index, known_points);
-  // What is taken over may be glazed, too.
-  for (int i = 0; before && known.has_same_glazing && i < static_cast<int>(point_count_); ++i)
-    if (known.point[i] >= 0 &&
-        std::binary_search(before->glazed_point.begin(), before->glazed_point.end(), known.point[i]))
-      link->glazed_point.push_back(i);
   std::sort(link->glazed_point.begin(), link->glazed_point.end());
   link->glazed_point.erase(std::unique(link->glazed_point.begin(), link->glazed_point.end()), link->glazed_point.end());
   return link;
@@ -168,14 +183,24 @@ void PointLinks::link_far(Link& link, glm::vec3 middle, const std::vector<int>& 
   std::vector<Ray> segments;
   std::vector<std::uint8_t> seen(far_points.size());
   std::vector<std::size_t> unknown;
+  std::size_t entered = block_middle_.size();
+  bool is_block_met = false;  // whether what has changed may stand between the patch and some point of the block
   for (std::size_t k = 0; k < far_points.size(); ++k) {
     const int i = far_points[k], known_point = known.number(i);
+    const Ray segment{middle, glm::vec3(x_[i], y_[i], z_[i]) - middle, 0, 1};
     if (known_point >= 0) {
-      seen[k] = known.link->seen_of(known_point);
-      continue;
+      if (entered != static_cast<std::size_t>(i) / kBlock) {
+        entered = static_cast<std::size_t>(i) / kBlock;
+        is_block_met = known.known.change->may_meet(middle, block_middle_[entered], block_radius_[entered]);
+      }
+      if (!is_block_met || !known.known.change->may_meet(segment)) {
+        seen[k] = known.seen[static_cast<std::size_t>(known_point)];
+        if (known.is_glazed[static_cast<std::size_t>(known_point)]) link.glazed_point.push_back(i);
+        continue;
+      }
     }
     unknown.push_back(k);
-    segments.push_back({middle, glm::vec3(x_[i], y_[i], z_[i]) - middle, 0, 1});
+    segments.push_back(segment);
   }
   std::vector<float> shares;
   std::vector<std::uint8_t> is_glazed;
@@ -237,11 +262,15 @@ void PointLinks::link_near(Link& link, int slot, const KnownPoints& known) const
   std::vector<float> weights, shares;
   std::vector<std::size_t> unknown;  // places in `weights` that a segment each speaks for
   std::vector<int> kept;
+  const glm::vec3 middle = mesh_.middle_of(slot).position;
+  float radius = 0;
+  for (const ElementShape& shape : shapes) radius = std::max(radius, glm::length(shape.middle - middle));
   for (const int i : link.near_point) {
     const int known_point = known.number(i);
     const float* before = known_point >= 0 ? known.link->near_weight_of(known_point, element_count) : nullptr;
-    if (before) {
+    if (before && !known.known.change->may_meet({x_[i], y_[i], z_[i]}, middle, radius)) {
       kept.push_back(i);
+      if (known.is_glazed[static_cast<std::size_t>(known_point)]) link.glazed_point.push_back(i);
       weights.insert(weights.end(), before, before + element_count);
       continue;
     }

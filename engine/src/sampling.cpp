@@ -81,9 +81,13 @@ const auto kTable = [] {
   return table;
 }();
 
-float coordinate(std::uint32_t index, int dimension, std::uint32_t seed) {
+std::uint32_t scrambled(std::uint32_t index, int dimension, std::uint32_t seed) {
   const std::uint32_t plain = index < kTabulated ? kTable[index][dimension] : plain_coordinate(index, dimension);
-  return std::min(static_cast<float>(owen_scramble(plain, seed)) * 0x1p-32f, 0x1.fffffep-1f);
+  return owen_scramble(plain, seed);
+}
+
+float coordinate(std::uint32_t index, int dimension, std::uint32_t seed) {
+  return std::min(static_cast<float>(scrambled(index, dimension, seed)) * 0x1p-32f, 0x1.fffffep-1f);
 }
 
 }  // namespace
@@ -106,6 +110,18 @@ glm::vec4 SobolSequence::point4(std::uint32_t index) const {
           coordinate(index, 3, seeds_[3])};
 }
 
+glm::ivec2 SobolSequence::cell2(std::uint32_t index, int bits) const {
+  if (bits == 0) return {0, 0};
+  return {scrambled(index, 0, seeds_[0]) >> (32 - bits), scrambled(index, 1, seeds_[1]) >> (32 - bits)};
+}
+
+int coherent_bits(int count) {
+  const std::uint32_t size = std::bit_ceil(static_cast<std::uint32_t>(std::max(count, 1)));
+  int bits = 0;  // cells of about sixteen points
+  while ((16u << (2 * (bits + 1))) <= size) ++bits;
+  return bits;
+}
+
 const std::vector<std::uint32_t>& coherent_order(int count) {
   static std::mutex mutex;
   static std::map<std::uint32_t, std::vector<std::uint32_t>> orders;
@@ -113,8 +129,7 @@ const std::vector<std::uint32_t>& coherent_order(int count) {
   const std::uint32_t size = std::bit_ceil(static_cast<std::uint32_t>(std::max(count, 1)));
   std::vector<std::uint32_t>& order = orders[size];
   if (!order.empty()) return order;
-  int bits = 0;  // of each coordinate: cells of about sixteen points
-  while ((16u << (2 * (bits + 1))) <= size) ++bits;
+  const int bits = coherent_bits(count);
   std::vector<std::pair<std::uint64_t, std::uint32_t>> by_cell;
   for (std::uint32_t index = 0; index < size; ++index) {
     std::uint64_t interleaved = 0;

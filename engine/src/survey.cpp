@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "streams.h"
 #include "transom/parallel.h"
 #include "transom/sampling.h"
 
@@ -12,7 +13,7 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr int kRaysPerSource = 256;         // from each face or point that light starts at
-constexpr std::uint32_t kRaysPerSlot = 16;  // of a slot that no patch has seen
+constexpr std::uint32_t kRaysPerSlot = 16;  // of a slot or a side that nothing has seen
 constexpr int kLeastSeen = 2;               // of them on patches indoors: one may have slipped through an edge
 constexpr int kReflections = 6;             // followed to find what lies indoors
 constexpr float kHollowShare = 0.25f;       // of a source's rays on the inside of a solid: then it is a room
@@ -145,6 +146,50 @@ std::vector<char> survey_interior(const SceneGeometry& scene, const RayScene& ra
   return Surveyor(scene, rays, faces, seed).run();
 }
 
+void add_sides_that_see_indoors(const SceneGeometry& scene, const Faces& faces, const RayScene& rays,
+                                std::uint32_t seed, std::vector<char>& is_indoors) {
+  std::vector<int> unseen;  // sides, as 2 * face + side
+  for (int side = 0; side < 2 * static_cast<int>(faces.faces.size()); ++side) {
+    const Face& face = faces.faces[static_cast<std::size_t>(side / 2)];
+    if (scene.materials[face.material].opening < 0 && !faces.is_inside_solid(side / 2, side % 2) &&
+        !(is_indoors[side / 2] & side_bit(side % 2)))
+      unseen.push_back(side);
+  }
+  for (bool any = true; any;) {
+    std::vector<char> sees(unseen.size(), 0);
+    parallel_indices(unseen.size(), 64, [&](std::size_t i) {
+      const int face = unseen[i] / 2, side = unseen[i] % 2;
+      const Face& own_face = faces.faces[static_cast<std::size_t>(face)];
+      const SobolSequence points(
+          place_seed(seed, kSurveyStream,
+                     {own_face.corner[0] + own_face.corner[2], side == 0 ? own_face.normal : -own_face.normal}));
+      Ray own[kRaysPerSlot];
+      Hit hits[kRaysPerSlot];
+      for (std::uint32_t k = 0; k < kRaysPerSlot; ++k) {
+        const glm::vec4 u = points.point4(k);
+        const glm::vec2 st = own_face.is_quad ? glm::vec2(u.z, u.w) : sample_triangle({u.z, u.w});
+        own[k].origin = leave(faces, face, side, st, {u.x, u.y}, own[k].direction);
+      }
+      rays.intersect(RayScene::What::kAll, own, hits);
+      int seen = 0;
+      for (const Hit& hit : hits) {
+        if (hit.face < 0) return;  // outdoors
+        seen += (is_indoors[hit.face] & side_bit(hit.side)) != 0;
+      }
+      sees[i] = seen >= kLeastSeen;
+    });
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < unseen.size(); ++i) {
+      if (sees[i])
+        is_indoors[unseen[i] / 2] |= side_bit(unseen[i] % 2);
+      else
+        unseen[kept++] = unseen[i];
+    }
+    any = kept < unseen.size();
+    unseen.resize(kept);
+  }
+}
+
 std::vector<int> slots_that_see(const std::vector<char>& is_interior, const std::vector<int>& patch_of_slot,
                                 const LightMesh& mesh, const RayScene& rays, std::uint32_t seed) {
   std::vector<char> sees(patch_of_slot.size(), 0);
@@ -175,7 +220,7 @@ std::vector<int> slots_that_see(const std::vector<char>& is_interior, const std:
 }
 
 std::vector<float> choose_edges(const Faces& faces, const std::vector<char>& is_indoors, float maximum_edge,
-                                int target_patch_count) {
+                                float outdoor_edge, int target_patch_count) {
   double indoors = 0, outdoors = 0;
   for (std::size_t f = 0; f < faces.faces.size(); ++f) {
     const double sides = faces.is_inside_solid(static_cast<int>(f), 1) ? 1 : 2;
@@ -183,11 +228,12 @@ std::vector<float> choose_edges(const Faces& faces, const std::vector<char>& is_
   }
   if (indoors == 0) std::swap(indoors, outdoors);
   const double edge = maximum_edge > 0 ? maximum_edge : std::sqrt(indoors / target_patch_count);
-  const double outdoor_edge = std::max(edge, std::sqrt(outdoors / kOutdoorPatchCount));
+  const double edge_outdoors =
+      std::max(edge, outdoor_edge > 0 ? outdoor_edge : std::sqrt(outdoors / kOutdoorPatchCount));
   std::vector<float> edges;
   edges.reserve(is_indoors.size());
   for (const char indoor : is_indoors)
-    edges.push_back(static_cast<float>(indoor || indoors == 0 ? edge : outdoor_edge));
+    edges.push_back(static_cast<float>(indoor || indoors == 0 ? edge : edge_outdoors));
   return edges;
 }
 

@@ -119,8 +119,9 @@ class Engine:
         """An engine for the edited scene: equal to a fresh solve with this one's options, and faster.
 
         What the edit leaves valid is taken over (`facts()["kept"]`): a reflectance or a luminance costs no ray, glazing
-        or a closed opening only rays through openings. transom.edits makes such scenes. This engine stays as it is. The
-        new one has no light yet. Raises InputError for a room that is not closed.
+        or a closed opening only rays through openings, an object moved, added or removed those that may meet it, while
+        the extent of the scene remains. transom.edits makes such scenes. This engine stays as it is. The new one has no
+        light yet. Raises InputError for a room that is not closed.
         """
         try:
             core = _engine.Engine(self._core, engine_geometry(scene))

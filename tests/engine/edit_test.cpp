@@ -46,16 +46,40 @@ void expect_equal_light(const Engine& edited, const Engine& fresh) {
   EXPECT_EQ(a->node_indirect, b->node_indirect);
 }
 
+// The options of a fresh solve whose patches are as long as those of an edit of `solved`.
+SolveOptions same_edges(const Engine& solved) {
+  SolveOptions same = options();
+  same.maximum_edge_m = solved.facts().maximum_edge_m;
+  same.outdoor_edge_m = solved.facts().outdoor_edge_m;
+  return same;
+}
+
+// Moves the vertices of a box of `furnished_room`, of which `number` counts from 0.
+void move_box(SceneGeometry& scene, int number, glm::dvec3 offset) {
+  const std::size_t count = roof_light_room(0.6f).vertices.size();
+  const std::size_t first[]{count, count + 8, count + 20};  // the ground outdoors stands between the second and third
+  for (std::size_t k = 0; k < 8; ++k) scene.vertices[first[number] + k] += offset;
+}
+
+void remove_faces(SceneGeometry& scene, int material) {
+  std::size_t kept = 0;
+  for (std::size_t f = 0; f < scene.faces.size(); ++f) {
+    if (scene.face_material[f] == material) continue;
+    scene.faces[kept] = scene.faces[f];
+    scene.face_material[kept++] = scene.face_material[f];
+  }
+  scene.faces.resize(kept);
+  scene.face_material.resize(kept);
+}
+
 // Solves the scene before and after an edit.
 template <typename Edit>
 SolveFacts expect_fresh(const Edit& edit) {
   SceneGeometry scene = furnished_room();
   const Engine before(scene, tregenza(), options());
   edit(scene);
-  SolveOptions same_edge = options();
-  same_edge.maximum_edge_m = before.facts().maximum_edge_m;
-  const Engine edited(before, scene), fresh(scene, tregenza(), same_edge);
-  expect_equal_light(edited, fresh);
+  const Engine edited(before, scene);
+  expect_equal_light(edited, Engine(scene, tregenza(), same_edges(before)));
   return edited.facts();
 }
 
@@ -104,6 +128,92 @@ TEST(Edit, AnOpeningClosedByAnOpaqueSurfaceIsThatOfAFreshSolve) {
       if (scene.materials[scene.face_material[f]].opening >= 0) scene.face_material[f] = 2;
   });
   EXPECT_GT(facts.kept_patch_rows, facts.patch_count / 2);
+}
+
+// Rows that are begun from known ones, of patches and nodes, where a small object changes.
+constexpr double kRowsThatStay = 0.8;
+
+TEST(Edit, AMovedObjectIsThatOfAFreshSolveAndKeepsRows) {
+  const SolveFacts facts = expect_fresh([](SceneGeometry& scene) { move_box(scene, 0, {0.6, 0.3, 0.2}); });
+  EXPECT_GT(facts.kept_patch_rows, kRowsThatStay * facts.patch_count);
+  EXPECT_GT(facts.kept_node_rows, kRowsThatStay * facts.node_count);
+}
+
+TEST(Edit, AMovedLampIsThatOfAFreshSolve) {
+  expect_fresh([](SceneGeometry& scene) { move_box(scene, 1, {-1, -0.4, 0.5}); });
+}
+
+TEST(Edit, AnObjectMovedOutdoorsBeforeAnOpeningIsThatOfAFreshSolve) {
+  const SolveFacts facts = expect_fresh([](SceneGeometry& scene) { move_box(scene, 2, {0.5, 0.7, 0}); });
+  EXPECT_GT(facts.kept_node_rows, kRowsThatStay * facts.node_count);
+}
+
+TEST(Edit, AnAddedObjectIsThatOfAFreshSolveAndKeepsRows) {
+  const SolveFacts facts = expect_fresh([](SceneGeometry& scene) { add_box(scene, {2.5, 0.5, 1}, {3, 1.5, 1.6}, 2); });
+  EXPECT_GT(facts.kept_patch_rows, kRowsThatStay * facts.patch_count);
+  EXPECT_GT(facts.kept_node_rows, kRowsThatStay * facts.node_count);
+}
+
+TEST(Edit, AnObjectRemovedFromAmongOthersIsThatOfAFreshSolveAndKeepsRows) {
+  const SolveFacts facts = expect_fresh([](SceneGeometry& scene) { remove_faces(scene, 3); });
+  EXPECT_GT(facts.kept_patch_rows, kRowsThatStay * facts.patch_count);
+  EXPECT_GT(facts.kept_node_rows, kRowsThatStay * facts.node_count);
+}
+
+TEST(Edit, ABoxPutOnTheFloorCoversWhatItStandsOn) {
+  const SolveFacts facts = expect_fresh([](SceneGeometry& scene) { move_box(scene, 0, {0.3, 0.2, -0.7}); });
+  EXPECT_GT(facts.kept_patch_rows, kRowsThatStay * facts.patch_count);
+}
+
+TEST(Edit, ABoxThatStandsOnTheFloorUncoversItWhenItLeaves) {
+  SceneGeometry scene = furnished_room();
+  add_box(scene, {0.5, 2.2, 0}, {1.5, 3.4, 0.6}, 2);
+  const Engine before(scene, tregenza(), options());
+  remove_faces(scene, 2);
+  expect_equal_light(Engine(before, scene), Engine(scene, tregenza(), same_edges(before)));
+}
+
+TEST(Edit, ABoxThroughAWallIsThatOfAFreshSolve) {
+  expect_fresh([](SceneGeometry& scene) { move_box(scene, 0, {2.5, 0.4, 0.3}); });
+}
+
+TEST(Edit, AWallThatCutsTheFloorIsThatOfAFreshSolve) {
+  expect_fresh([](SceneGeometry& scene) { add_quad(scene, {2.6, 0, 0}, {2.6, 4, 0}, {2.6, 4, 2}, {2.6, 0, 2}, 2); });
+}
+
+TEST(Edit, AnObjectThatMovesTheMiddleOfTheSceneIsThatOfAFreshSolve) {
+  const SolveFacts facts = expect_fresh([](SceneGeometry& scene) { move_box(scene, 2, {20, 0, 0}); });
+  EXPECT_EQ(facts.kept_patch_rows, 0);
+}
+
+TEST(Edit, EditsInSequenceAreThoseOfAFreshSolveAndThereAndBackIsTheBeginning) {
+  SceneGeometry scene = furnished_room();
+  const Engine before(scene, tregenza(), same_edges(Engine(scene, tregenza(), options())));
+  move_box(scene, 0, {0.6, 0.3, 0.2});
+  const Engine once(before, scene);
+  scene.openings[0].transmittance = {0.f, 0.4f};
+  move_box(scene, 1, {-0.5, -0.5, 0.4});
+  const Engine twice(once, scene);
+  expect_equal_light(twice, Engine(scene, tregenza(), same_edges(before)));
+  expect_equal_light(Engine(twice, furnished_room()), before);
+}
+
+// Enough faces that small ones share patches.
+TEST(Edit, AnObjectMovedAmongClusteredFacesIsThatOfAFreshSolve) {
+  SolveOptions few = options();
+  few.target_patch_count = 150;
+  SceneGeometry scene = furnished_room();
+  for (int i = 0; i < 64; ++i) {
+    const glm::dvec3 low(0.3 + 0.4 * (i % 8), 0.3 + 0.4 * (i / 8), 0.3);
+    add_box(scene, low, low + 0.08, 2);
+  }
+  const Engine before(scene, tregenza(), few);
+  for (std::size_t k = 1; k <= 8; ++k) scene.vertices[scene.vertices.size() - k] += glm::dvec3(0.05, -0.1, 1.2);
+  few.maximum_edge_m = before.facts().maximum_edge_m;
+  few.outdoor_edge_m = before.facts().outdoor_edge_m;
+  const Engine edited(before, scene);
+  expect_equal_light(edited, Engine(scene, tregenza(), few));
+  EXPECT_GT(edited.facts().kept_patch_rows, edited.facts().patch_count / 2);
 }
 
 TEST(Edit, TheEngineThatIsEditedKeepsItsLight) {

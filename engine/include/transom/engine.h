@@ -21,6 +21,7 @@
 #include "transom/panels.h"
 #include "transom/point_links.h"
 #include "transom/ray_scene.h"
+#include "transom/scene_change.h"
 #include "transom/sky.h"
 #include "transom/trace.h"
 #include "transom/transfer.h"
@@ -35,6 +36,7 @@ enum class Method { kGather, kClassic };
 struct SolveOptions {
   Method method = Method::kGather;
   float maximum_edge_m = 0;       ///< of a patch; 0: from the target number of patches
+  float outdoor_edge_m = 0;       ///< of a patch outdoors, if longer; 0: so that these are not too many
   int target_patch_count = 3000;  ///< sides of cells that take part in the exchange of light, about
   int elements_per_edge = 4;      ///< a patch has the square of it
   GatherSamples patch_samples{512, 128};
@@ -49,13 +51,14 @@ struct SolveOptions {
 /// What the solve found and did, for the run bundle.
 struct SolveFacts {
   int face_count = 0, patch_count = 0, interior_patch_count = 0, node_count = 0;
-  float maximum_edge_m = 0;
+  float maximum_edge_m = 0, outdoor_edge_m = 0;
   double leak_share = 0;  ///< of the hemisphere rays of interior patches, those that met nothing
   TransferDefects defects;
   int cluster_count = 0;  ///< of patches, for interreflection
   int panel_count = 0, panel_bin_count = 0;
-  std::size_t link_bytes = 0;                   ///< of what is kept of how nodes see patches
-  int kept_patch_rows = 0, kept_node_rows = 0;  ///< taken over from another engine, but for what lies behind openings
+  std::size_t link_bytes = 0;  ///< of what is kept of how nodes see patches
+  /// Rows begun from those of another engine: but for what lies behind openings, and for single rays, they are its own.
+  int kept_patch_rows = 0, kept_node_rows = 0;
 };
 
 /// Flux balance of the interior [lm], linear RGB. Interior: every side that light from the rooms' side of the openings,
@@ -77,8 +80,10 @@ class Engine {
   Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions options);
 
   /// Solves a scene with the options of an engine whose scene was another, and takes over what that found wherever the
-  /// edit leaves it valid: equal bit by bit to a fresh solve whose patches have the same longest edge, and faster.
-  /// Reflectance, luminance: no ray is cast anew. Glazing, or an opening closed: only rays through openings are.
+  /// edit leaves it valid: equal bit by bit to a fresh solve whose patches have the same longest edges, and faster.
+  /// Reflectance, luminance: no ray is cast anew. Glazing, or an opening closed: only rays through openings are. An
+  /// object moved, added or removed: only rays that meet the boxes around it, where it was and where it is, as long as
+  /// the extent of the scene remains.
   /// `solved` is not changed and may go. Throws as above.
   Engine(const Engine& solved, SceneGeometry scene);
   ~Engine();
@@ -142,12 +147,15 @@ class Engine {
   /// What an engine of an earlier state of the scene found, as far as it is valid.
   struct Known {
     const Engine* engine = nullptr;
-    bool has_surroundings = false;                              // faces and their cells are the same
-    bool has_openings = false;                                  // and so is all glazing
-    bool has_same_patches = false;                              // with the same numbers
-    bool has_same_nodes = false;                                // with the same numbers
-    std::unordered_multimap<std::uint32_t, int> nodes_by_seed;  // if they have seen all patches of this engine
-    std::vector<int> node;                                      // its number of each node here, or -1
+    std::unique_ptr<SceneChange> change;  // null without an engine
+    bool has_openings = false;            // all faces of openings and their glazing are the same
+    bool has_same_patches = false;        // no face has changed, and patches have the same numbers
+    bool has_same_nodes = false;          // and nodes have
+    std::unordered_multimap<std::uint32_t, int> nodes_by_seed;
+    std::vector<int> node;  // its number of each node here, or -1
+    bool has_same_faces() const { return change && change->is_none(); }
+    int patch(int slot) const;  // its number of the patch of a slot here, or -1
+    std::vector<Share> slots_of(std::vector<Share> patches, const std::vector<Share>& unlit) const;
   };
   /// What a patch sees, by slot: without looking through openings; and through them, with all of the sky.
   struct PatchRow {
@@ -156,15 +164,21 @@ class Engine {
   /// What nodes see without looking through openings: patches, and the sky seen by itself.
   struct NodeRows {
     SparseRows patches, sky;
-    SparseRows near;  // elements of the nearest patches
+    SparseRows near;                  // elements of the nearest slots
+    SparseRows unlit, unlit_through;  // slots that are no patches: an edit may make them so
     std::vector<float> exposure, harmonic_distance;
+    std::vector<std::int64_t> inverse_distance;
   };
 
   void solve(const Engine* solved);
-  FaceClusters clusters() const;
+  FaceClusters clusters(const std::vector<float>& edges) const;
+  int opening_of(int face) const;
+  std::vector<int> opening_faces() const;
   Known known_from(const Engine* solved) const;
   std::vector<int> first_wave() const;
   PatchRow patch_row(int slot, const Known& known) const;
+  std::shared_ptr<const GatherRow> surroundings_of_patch(int slot, const std::shared_ptr<const GatherRow>& known_row,
+                                                         const Known& known) const;
   void find_patches(std::vector<int> wave, const Known& known);
   void find_unseen_patches(const Known& known);
   std::vector<int> first_slots() const;
@@ -176,6 +190,7 @@ class Engine {
   struct NodeTrial;
   std::vector<TrialLight> trial_lights() const;
   GatherRow surroundings_of_node(const Node& node, int known_node, const Known& known) const;
+  void look_through_openings(const Node& node, int known_node, const Known& known, GatherRow& row) const;
   void gather_new_nodes(NodeTrial& trial, int first_part, Known& known);
   void keep_node_rows(NodeTrial& trial, Known& known);
   void resolve_near_light(const NodeTrial& trial);
@@ -184,6 +199,7 @@ class Engine {
   void gather_nodes(Known& known);
   void link_nodes(const Known& known);
   std::uint32_t node_seed(const Node& node) const;
+  std::uint32_t patch_seed(int slot) const;
   void gather_panels();
   void link_panels();
   void balance_panels();
@@ -198,6 +214,7 @@ class Engine {
   void find_smooth_radiosity(Lighting& lighting) const;
   void gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& first_reflection) const;
   std::vector<Share> to_patches(const std::vector<Share>& slots) const;
+  std::vector<Share> unlit_of(const std::vector<Share>& slots) const;
   glm::vec3 sky_light(const Lighting& lighting, const SparseRows& rows, std::size_t row) const;
   void find_shafts(Condition& condition, std::vector<glm::vec3>& residual) const;
   double find_panel_radiance(const std::vector<glm::vec3>& radiosity, Lighting& lighting) const;
@@ -216,7 +233,6 @@ class Engine {
   SolveFacts facts_;
   Faces faces_;
   std::unique_ptr<RayScene> rays_;
-  std::vector<float> edges_;  // longest of patches, by face [m]
   std::unique_ptr<LightMesh> mesh_;
   std::unique_ptr<SkyBinIndex> sky_index_;
   std::unique_ptr<Panels> panels_;

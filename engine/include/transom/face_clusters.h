@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <span>
 #include <vector>
 
 #include "transom/geometry.h"
@@ -24,8 +25,6 @@ class FaceClusters {
   /// `largest_count` clusters. Each cluster has `elements` parts of about equal area.
   FaceClusters(const Faces& faces, const std::vector<char>& is_small, float cube_m, int largest_count, int elements);
 
-  bool operator==(const FaceClusters& other) const { return begin_ == other.begin_ && sides_ == other.sides_; }
-
   int count() const { return static_cast<int>(begin_.size()) - 1; }
   /// Cluster of a side, or -1; and its element there.
   int cluster_of(int face, Side side) const {
@@ -33,6 +32,10 @@ class FaceClusters {
   }
   int element_of(int face, Side side) const { return element_of_side_[2 * face + side]; }
 
+  /// The sides of a cluster, each as 2 * face + side.
+  std::span<const int> sides(int cluster) const {
+    return {sides_.data() + begin_[cluster], begin_[cluster + 1] - begin_[cluster]};
+  }
   float area(int cluster) const { return area_[cluster]; }
   const ClusterElement& element(int cluster, int element) const { return elements_[cluster * per_cluster_ + element]; }
 
@@ -46,7 +49,9 @@ class FaceClusters {
  private:
   void find_clusters(const Faces& faces, const std::vector<char>& is_small, float cube_m, int largest_count);
   void find_elements(const Faces& faces, int cluster);
-  int sample_between(std::size_t first, std::size_t last, float& u) const;
+  int sample_between(int cluster, std::size_t first, std::size_t last, float& u) const;
+  /// Of the sides of the cluster that begins at `begin`, before side i.
+  double area_before(std::size_t i, std::size_t begin) const { return i > begin ? area_up_to_[i - 1] : 0.0; }
 
   int per_cluster_ = 1;
   std::vector<int> cluster_of_side_;
@@ -54,7 +59,7 @@ class FaceClusters {
   std::vector<std::size_t> begin_{0};       // into sides_, by cluster
   std::vector<std::size_t> element_begin_;  // into sides_, by element of all clusters, and one more
   std::vector<int> sides_;                  // along a curve that keeps neighbours together
-  std::vector<double> area_before_;         // of all sides before, and one more
+  std::vector<double> area_up_to_;          // of the sides of the same cluster up to and with each
   std::vector<float> area_;
   std::vector<ClusterElement> elements_;
 };

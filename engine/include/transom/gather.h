@@ -1,7 +1,9 @@
 /// @file Where the light of a point or a patch comes from: shares of slots, sky bins, and openings looked through.
 #pragma once
 
+#include <cstdint>
 #include <glm/glm.hpp>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -12,6 +14,8 @@
 namespace transom {
 
 class Panels;
+class SceneChange;
+struct HemisphereTally;
 
 /// Numbers of samples for one receiver.
 struct GatherSamples {
@@ -25,6 +29,8 @@ struct GatherSamples {
 struct Share {
   int index;
   float weight;
+
+  bool operator==(const Share&) const = default;
 };
 
 /// The light of one receiver as weights. Illuminance E = sum reached B + sum through B + sum sky L.
@@ -37,6 +43,8 @@ struct GatherRow {
   float escaped = 0;            ///< share of the hemisphere that meets nothing: open sky
   float exposure = 1;           ///< share of the receiver that does not lie inside a solid
   float harmonic_distance = 0;  ///< harmonic mean distance of what is seen [m]
+  /// Sum over the rays of 1 / distance, as a whole number of steps, so that single rays can be taken back.
+  std::int64_t inverse_distance = 0;
 };
 
 /// Samples the surroundings of receivers. The row of a receiver depends on its seed alone.
@@ -57,6 +65,19 @@ class Gatherer {
   /// Of a patch: means over its exposed part.
   GatherRow surroundings_of_patch(int slot, GatherSamples samples, std::uint32_t seed) const;
 
+  /// The same of a receiver of which the row is known that `before` found with the same samples and seed, in another
+  /// state of the scene: only rays that may meet what has changed are cast, in both states, and the row is equal bit by
+  /// bit to one that is found anew. known: its slots as they are numbered here, sorted, less those that are gone; of an
+  /// open sky, what is seen without looking through openings.
+  GatherRow surroundings_of_point(const Node& point, GatherSamples samples, std::uint32_t seed, GatherRow known,
+                                  const Gatherer& before, const SceneChange& change) const;
+  GatherRow surroundings_of_patch(int slot, GatherSamples samples, std::uint32_t seed, GatherRow known,
+                                  const Gatherer& before, const SceneChange& change) const;
+
+  /// Whether a ray through an opening may meet what has changed, from a point, or from a patch. False is certain.
+  bool may_see_through_openings(const Node& point, const SceneChange& change) const;
+  bool may_see_through_openings(int slot, const SceneChange& change) const;
+
   /// Adds what is seen through openings, `through` and `sky`, to a row of which the exposure is known.
   void look_through_openings(const Node& point, GatherSamples samples, std::uint32_t seed, GatherRow& row) const;
   void look_through_openings(int slot, GatherSamples samples, std::uint32_t seed, GatherRow& row) const;
@@ -75,8 +96,13 @@ class Gatherer {
   };
   auto places_on(int slot_index) const;
   template <typename OriginOf>
-  void gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, bool tells_near,
-                         GatherRow& row) const;
+  GatherRow gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, bool tells_near) const;
+  template <typename OriginOf>
+  bool gather_again(const OriginOf& origin_of, const Node& middle, float radius, int count, std::uint32_t seed,
+                    bool tells_near, const Gatherer& before, const SceneChange& change, GatherRow& row) const;
+  void add_hits(std::span<const Ray> rays, bool tells_near, HemisphereTally& tally) const;
+  float radius_of(int slot) const;
+  bool may_see_through_openings(const Node& middle, float radius, const SceneChange& change) const;
   template <typename OriginOf>
   void gather_openings(const Origin& middle, const OriginOf& origin_of, int count, std::uint32_t seed,
                        GatherRow& row) const;

@@ -88,9 +88,6 @@ struct Faces {
   float ray_offset() const { return 1e-5f * extent; }
 };
 
-/// Whether the faces of two scenes are in the same places, whatever they are made of, and the same shells are solid.
-bool are_same_places(const Faces& a, const Faces& b);
-
 /// Recentres the scene in double precision, cuts faces at openings and walls, then finds normals, areas and closed
 /// solids.
 Faces make_faces(const SceneGeometry& scene);

@@ -34,10 +34,7 @@ class LightMesh {
             FaceClusters clusters = {});
 
   const Faces& faces() const { return *faces_; }
-  /// Whether each of the other's faces has a cell where this one's has: their slots are then the same.
-  bool has_same_cells(const LightMesh& other) const {
-    return elements_per_edge_ == other.elements_per_edge_ && grids_ == other.grids_ && clusters_ == other.clusters_;
-  }
+  const FaceClusters& clusters() const { return clusters_; }
   int slot_count() const { return first_cluster_slot() + clusters_.count(); }
   int elements_per_slot() const { return elements_per_edge_ * elements_per_edge_; }
   const Grid& grid(int face) const { return grids_[static_cast<std::size_t>(face)]; }

@@ -11,6 +11,7 @@
 #include "transom/first_bounce.h"
 #include "transom/light_mesh.h"
 #include "transom/ray_scene.h"
+#include "transom/scene_change.h"
 
 namespace transom {
 
@@ -24,12 +25,13 @@ class PointLinks {
  public:
   PointLinks(const LightMesh& mesh, const RayScene& rays, const std::vector<Node>& points);
 
-  /// What has been linked in the same places.
+  /// What has been linked in another state of the scene.
   struct Known {
     const PointLinks* links = nullptr;
-    std::vector<int> point;         ///< its number of each point here, or -1
-    bool has_same_points = false;   ///< all of them, in the same order
-    bool has_same_glazing = false;  ///< else only what is seen without looking through an opening is of use
+    const SceneChange* change = nullptr;  ///< between that state and this one
+    std::vector<int> point;               ///< its number of each point here, or -1
+    bool has_same_points = false;         ///< all of them, in the same order, and no face has changed
+    bool has_same_glazing = false;        ///< else only what is seen without looking through an opening is of use
   };
 
   /// Links the patches of these slots to all points, as far as memory allows. known: what need not be found again.
@@ -56,13 +58,15 @@ class PointLinks {
     std::vector<float> near_sum;     // for each near point: the sum of these
     std::vector<glm::vec4> element;  // of the patch: middle, lifted, and area
     std::vector<int> glazed_point;   // ascending: points between which and the patch some opening stands
-    std::uint8_t seen_of(int point) const;
     const float* near_weight_of(int point, std::size_t element_count) const;  // null: not among the near points
   };
+  /// What another state of the scene had as the link of a patch.
   struct KnownPoints {
-    const Link* link;  // null: none is known
+    KnownPoints(const Known& known, const Link* link);
     const Known& known;
-    int number(int point) const;  // -1: to be found anew
+    const Link* link;                           // null: none is known
+    std::vector<std::uint8_t> seen, is_glazed;  // by the numbers of points there
+    int number(int point) const;                // -1: to be found anew
   };
   struct LitPatch {
     std::shared_ptr<const Link> link;
@@ -74,6 +78,7 @@ class PointLinks {
   };
   std::size_t bytes_of(const Link& link) const;
   glm::vec3 exposed_middle(int slot) const;
+  std::shared_ptr<const Link> known_link(int slot, glm::vec3 middle, const Known& known) const;
   std::vector<std::shared_ptr<const Link>> links_of(const std::vector<int>& slots, const Known& known) const;
   std::shared_ptr<const Link> link(int slot, const Known& known) const;
   void link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points, const KnownPoints& known) const;
@@ -89,6 +94,8 @@ class PointLinks {
   const RayScene& rays_;
   std::size_t point_count_;
   std::vector<float> x_, y_, z_, nx_, ny_, nz_;  // of the points, padded to whole blocks
+  std::vector<glm::vec3> block_middle_;
+  std::vector<float> block_radius_;
 
   // What has been found is kept. It changes no answer, only what the next one costs.
   mutable std::mutex mutex_;

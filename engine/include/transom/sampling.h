@@ -26,6 +26,9 @@ class SobolSequence {
   glm::vec2 point2(std::uint32_t index) const;
   glm::vec4 point4(std::uint32_t index) const;
 
+  /// The cell of the first two coordinates, of 2^bits an axis, that point number `index` lies in.
+  glm::ivec2 cell2(std::uint32_t index, int bits) const;
+
  private:
   std::array<std::uint32_t, 4> seeds_;  // by dimension
 };
@@ -39,6 +42,9 @@ double scrambled_coordinate(std::uint32_t index, std::uint32_t seed);
 /// lie close together in the first two dimensions, whatever the seed: scrambling moves cells of the square as a whole.
 /// For rays traced in packets; leave out those from `count` on.
 const std::vector<std::uint32_t>& coherent_order(int count);
+
+/// Of each coordinate: the order above passes through the square in cells of 2^-bits by 2^-bits, one after another.
+int coherent_bits(int count);
 
 /// Maps the unit square to the unit disc, preserving area and neighbourhood [Shirley & Chiu 1997].
 glm::vec2 sample_disc(glm::vec2 u);
