@@ -92,4 +92,17 @@ void BeamOutlines::covering(const BeamOutline& polygon, std::vector<int>& passag
     if (covers(k, polygon)) passages.push_back(k);
 }
 
+void BeamOutlines::mark_behind(int k, std::span<const float> x, std::span<const float> y, std::span<const float> z,
+                               std::span<int> is_behind) const {
+  const Passage& passage = passages_[static_cast<std::size_t>(k)];
+  const auto [a, b, c, d] = passage.inwards;
+  const glm::vec3 depth = passage.depth;
+  const int lets_light_in = passage.is_edge_on ? 0 : 1;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const auto along = [&](glm::vec3 line) { return line.x * x[i] + line.y * y[i] + line.z; };
+    is_behind[i] = static_cast<int>(along(a) >= 0) & static_cast<int>(along(b) >= 0) & static_cast<int>(along(c) >= 0) &
+                   static_cast<int>(along(d) >= 0) & static_cast<int>(along(depth) > z[i]) & lets_light_in;
+  }
+}
+
 }  // namespace transom

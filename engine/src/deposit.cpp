@@ -301,18 +301,31 @@ void DirectLight::sun_transmission(const Sun& sun, const SunlitSlot& slot, std::
   thread_local std::vector<Ray> rays;
   thread_local std::vector<std::size_t> index;
   thread_local std::vector<std::uint8_t> blocked;
+  thread_local std::vector<float> x, y, z;
+  thread_local std::vector<int> is_behind, is_crossed;
+  const std::size_t count = points.size();
+  for (std::vector<float>* list : {&x, &y, &z}) list->resize(count);
+  is_behind.resize(count);
+  is_crossed.assign(count, slot.is_behind_openings ? 0 : 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    const glm::vec3 place = sun.outlines.along_beam(points[i]);
+    x[i] = place.x;
+    y[i] = place.y;
+    z[i] = place.z;
+    share[i] = 1;
+  }
+  for (const int k : slot.passages) {
+    sun.outlines.mark_behind(k, x, y, z, is_behind);
+    const float transmittance = sun.transmittance[k];
+    for (std::size_t i = 0; i < count; ++i) {
+      share[i] *= is_behind[i] ? transmittance : 1.f;
+      is_crossed[i] |= is_behind[i];
+    }
+  }
   rays.clear();
   index.clear();
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    bool is_crossed = false;
-    share[i] = 1;
-    const glm::vec3 place = sun.outlines.along_beam(points[i]);
-    for (const int k : slot.passages)
-      if (sun.outlines.is_before(k, place)) {
-        share[i] *= sun.transmittance[k];
-        is_crossed = true;
-      }
-    if (slot.is_behind_openings && !is_crossed) share[i] = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!is_crossed[i]) share[i] = 0;
     if (share[i] <= 0) continue;
     rays.push_back({points[i], sun.beam.direction_to_source});
     index.push_back(i);

@@ -1,5 +1,7 @@
 #include "transom/point_links.h"
 
+#include <xmmintrin.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -18,14 +20,17 @@ constexpr float kLeastDistance2 = 1e-15f;    // keeps 0 / 0 out of weights that 
 constexpr std::size_t kBlocksAtOnce = 8;
 constexpr float kEven = 1e-3f;  // relative difference of elements that count as evenly lit
 
-// Sums of every eighth product: the order in which they are added is fixed, whatever the instruction set.
-inline float weighted_sum(const float* weight, const std::vector<float>& value) {
-  float sums[8] = {};
+// Sum of weight x value: every fourth product goes to the same of four sums.
+inline glm::vec3 weighted_sum(const float* weight, const std::vector<glm::vec4>& value) {
+  __m128 sums[4] = {_mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps()};
+  const auto term = [&](std::size_t k) { return _mm_mul_ps(_mm_set1_ps(weight[k]), _mm_loadu_ps(&value[k].x)); };
   std::size_t k = 0;
-  for (; k + 8 <= value.size(); k += 8)
-    for (std::size_t lane = 0; lane < 8; ++lane) sums[lane] += weight[k + lane] * value[k + lane];
-  for (std::size_t lane = 0; k < value.size(); ++k, ++lane) sums[lane] += weight[k] * value[k];
-  return ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]));
+  for (; k + 4 <= value.size(); k += 4)
+    for (std::size_t lane = 0; lane < 4; ++lane) sums[lane] = _mm_add_ps(sums[lane], term(k + lane));
+  for (std::size_t lane = 0; k < value.size(); ++k, ++lane) sums[lane] = _mm_add_ps(sums[lane], term(k));
+  alignas(16) float sum[4];
+  _mm_store_ps(sum, _mm_add_ps(_mm_add_ps(sums[0], sums[1]), _mm_add_ps(sums[2], sums[3])));
+  return {sum[0], sum[1], sum[2]};
 }
 
 // Of what is stored of it.
@@ -357,7 +362,7 @@ PointLinks::LitPatch PointLinks::lit_patch(std::shared_ptr<const Link> link, std
   LitPatch patch;
   patch.normal = mesh_.normal_of(bright[first].element / per_slot);
   patch.radiosity = bright[first].radiosity;
-  for (std::vector<float>& channel : patch.sent) channel.assign(static_cast<std::size_t>(per_slot), 0.f);
+  patch.sent.assign(static_cast<std::size_t>(per_slot), glm::vec4(0));
   float sum = 0;
   for (std::size_t k = first; k < last; ++k) {
     const int e = bright[k].element % per_slot;
@@ -367,13 +372,13 @@ PointLinks::LitPatch PointLinks::lit_patch(std::shared_ptr<const Link> link, std
     patch.centroid += weight * glm::vec3(element);
     patch.flux += element.w / kPi * radiosity;
     sum += weight;
-    for (int channel = 0; channel < 3; ++channel) patch.sent[channel][e] = radiosity[channel];
+    patch.sent[e] = glm::vec4(radiosity, 0);
   }
   if (sum > 0) patch.centroid /= sum;
   for (std::size_t e = 0; e < link->element.size() && patch.is_even; ++e)
     for (int channel = 0; channel < 3; ++channel)
       patch.is_even &= link->element[e].w <= 0 ||
-                       std::abs(patch.sent[channel][e] - patch.radiosity[channel]) <= kEven * patch.radiosity[channel];
+                       std::abs(patch.sent[e][channel] - patch.radiosity[channel]) <= kEven * patch.radiosity[channel];
   patch.link = std::move(link);
   return patch;
 }
@@ -422,19 +427,11 @@ void PointLinks::add_blocks(const std::vector<LitPatch>& lit, std::size_t chunk,
     for (; near != link.near_point.end() && *near < static_cast<int>(last_block * kBlock); ++near) {
       const auto number = static_cast<std::size_t>(near - link.near_point.begin()),
                  to = static_cast<std::size_t>(*near) - base;
-      if (patch.is_even) {
-        const glm::vec3 received = link.near_sum[number] * patch.radiosity;
-        red[to] += received.x;
-        green[to] += received.y;
-        blue[to] += received.z;
-        continue;
-      }
-      const float* weight = &link.near_weight[number * per_slot];
-      red[to] += weighted_sum(weight, patch.sent[0]);
-      if constexpr (!kIsGrey) {
-        green[to] += weighted_sum(weight, patch.sent[1]);
-        blue[to] += weighted_sum(weight, patch.sent[2]);
-      }
+      const glm::vec3 received = patch.is_even ? link.near_sum[number] * patch.radiosity
+                                               : weighted_sum(&link.near_weight[number * per_slot], patch.sent);
+      red[to] += received.x;
+      green[to] += received.y;
+      blue[to] += received.z;
     }
   }
   const std::size_t count = std::min(point_count_, last_block * kBlock) - base;

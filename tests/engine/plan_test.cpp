@@ -116,16 +116,24 @@ TEST(Plan, OutlinesKnowWhatLightHasPassedAsRaysDo) {
   const SobolSequence sequence(3);
   for (const glm::vec3 to_sun : {glm::vec3(0, 0, 1), glm::vec3(0.4f, 0.3f, 1), glm::vec3(-1, 0.2f, 0.3f)}) {
     const BeamOutlines outlines(faces, {0, 1, 2}, to_sun);
-    int passed = 0;
-    for (std::uint32_t i = 0; i < 2000; ++i) {
+    std::vector<glm::vec3> points;
+    std::vector<float> x, y, z, share(2000, 1.f);
+    for (std::uint32_t i = 0; i < share.size(); ++i) {
       const glm::vec4 u = sequence.point4(i);
-      const glm::vec3 point = glm::vec3(7 * u.x, 4 * u.y, 4 * u.z) - glm::vec3(faces.origin);
-      float share = 1;
-      for (int k = 0; k < 3; ++k)
-        if (outlines.is_before(k, outlines.along_beam(point))) share *= 0.5f;
-      EXPECT_NEAR(share, rays.transmittance({point, glm::normalize(to_sun)}), 1e-5f);
-      passed += share < 1;
+      points.push_back(glm::vec3(7 * u.x, 4 * u.y, 4 * u.z) - glm::vec3(faces.origin));
+      const glm::vec3 place = outlines.along_beam(points.back());
+      x.push_back(place.x);
+      y.push_back(place.y);
+      z.push_back(place.z);
     }
+    for (int k = 0; k < 3; ++k) {
+      std::vector<int> is_behind(points.size());
+      outlines.mark_behind(k, x, y, z, is_behind);
+      for (std::size_t i = 0; i < points.size(); ++i) share[i] *= is_behind[i] ? 0.5f : 1.f;
+    }
+    for (std::size_t i = 0; i < points.size(); ++i)
+      EXPECT_NEAR(share[i], rays.transmittance({points[i], glm::normalize(to_sun)}), 1e-5f);
+    const auto passed = std::count_if(share.begin(), share.end(), [](float value) { return value < 1; });
     EXPECT_GT(passed, 50);
   }
 }

@@ -38,23 +38,17 @@ class BeamOutlines {
     return {glm::dot(point, across_), glm::dot(point, along_), glm::dot(point, towards_)};
   }
 
-  /// Whether what arrives at a point (as along_beam has it) has come through passage k, a planar one: exactly.
-  bool is_before(int k, glm::vec3 point) const {
-    const Passage& passage = passages_[static_cast<std::size_t>(k)];
-    if (point.x < passage.outline.low.x || point.x > passage.outline.high.x || point.y < passage.outline.low.y ||
-        point.y > passage.outline.high.y || passage.is_edge_on)
-      return false;
-    const glm::vec3 place(point.x, point.y, 1);
-    for (int edge = 0; edge < passage.outline.corner_count; ++edge)
-      if (glm::dot(passage.inwards[edge], place) < 0) return false;
-    return glm::dot(passage.depth, place) > point.z;
-  }
+  /// Which points (as along_beam has them: coordinates x, y and z, one after the other) lie behind passage k, a planar
+  /// one: light that arrives there along the beam has come through it. Exactly; is_behind: 1 or 0 for each.
+  void mark_behind(int k, std::span<const float> x, std::span<const float> y, std::span<const float> z,
+                   std::span<int> is_behind) const;
 
  private:
   struct Passage {
     BeamOutline outline;
-    std::array<glm::vec3, 4> inwards{};  // of each edge: (a, b, c) with a x + b y + c >= 0 on its inner side
-    glm::vec3 depth{0};                  // the same, of how far towards the source its plane is
+    // Of each edge: (a, b, c) with a x + b y + c >= 0 on its inner side. A triangle has one that all points pass.
+    std::array<glm::vec3, 4> inwards{glm::vec3(0), glm::vec3(0), glm::vec3(0), glm::vec3(0)};
+    glm::vec3 depth{0};  // the same, of how far towards the source its plane is
     bool is_edge_on = false;
   };
 

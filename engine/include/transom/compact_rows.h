@@ -32,15 +32,17 @@ struct HalfColours {
   std::vector<Half> value;
   bool is_grey = false;
 
-  HalfColours(const std::vector<glm::vec4>& colours, bool grey) : is_grey(grey) {
-    value.reserve(colours.size() * (grey ? 1 : 4));
+  HalfColours(const std::vector<glm::vec4>& colours, bool grey)
+      : value(colours.size() * (grey ? 1 : 4)), is_grey(grey) {
+    const int channels = grey ? 1 : 4;
     for (std::size_t i = 0; i < colours.size(); ++i)
-      for (int channel = 0; channel < (grey ? 1 : 4); ++channel) value.emplace_back(colours[i][channel], i);
+      for (int channel = 0; channel < channels; ++channel)
+        value[i * static_cast<std::size_t>(channels) + static_cast<std::size_t>(channel)] =
+            Half(colours[i][channel], i);
   }
   explicit HalfColours(const std::vector<glm::vec4>& colours) : HalfColours(colours, false) {}
-  explicit HalfColours(const std::vector<float>& greys) : is_grey(true) {
-    value.reserve(greys.size());
-    for (std::size_t i = 0; i < greys.size(); ++i) value.emplace_back(greys[i], i);
+  explicit HalfColours(const std::vector<float>& greys) : value(greys.size()), is_grey(true) {
+    for (std::size_t i = 0; i < greys.size(); ++i) value[i] = Half(greys[i], i);
   }
 };
 

@@ -74,7 +74,7 @@ class PointLinks {
     glm::vec3 flux{0};                 // reflected [lm], over pi
     bool is_even = true;               // all elements send the same
     glm::vec3 radiosity{0};            // of each of them then
-    std::vector<float> sent[3];        // by element, for each channel: radiosity
+    std::vector<glm::vec4> sent;       // by element: radiosity
   };
   std::size_t bytes_of(const Link& link) const;
   glm::vec3 exposed_middle(int slot) const;
