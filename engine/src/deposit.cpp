@@ -298,15 +298,22 @@ std::vector<DirectLight::SunlitSlot> DirectLight::reached(const Sun& sun, const 
 // openings let light to.
 void DirectLight::sun_transmission(const Sun& sun, const SunlitSlot& slot, std::span<const glm::vec3> points,
                                    std::span<float> share) const {
-  thread_local std::vector<Ray> rays;
-  thread_local std::vector<std::size_t> index;
-  thread_local std::vector<std::uint8_t> blocked;
-  thread_local std::vector<float> x, y, z;
-  thread_local std::vector<int> is_behind, is_crossed;
+  struct Scratch {
+    std::vector<Ray> rays;
+    std::vector<std::uint8_t> blocked;
+    std::vector<float> x, y, z;
+    std::vector<int> is_behind, is_crossed;
+  };
+  thread_local Scratch of_thread;
+  Scratch& scratch = of_thread;  // asked for once
   const std::size_t count = points.size();
-  for (std::vector<float>* list : {&x, &y, &z}) list->resize(count);
-  is_behind.resize(count);
-  is_crossed.assign(count, slot.is_behind_openings ? 0 : 1);
+  for (std::vector<float>* list : {&scratch.x, &scratch.y, &scratch.z}) list->resize(count);
+  scratch.is_behind.resize(count);
+  scratch.is_crossed.assign(count, slot.is_behind_openings ? 0 : 1);
+  scratch.rays.resize(count);
+  scratch.blocked.resize(count);
+  float *x = scratch.x.data(), *y = scratch.y.data(), *z = scratch.z.data();
+  int *is_behind = scratch.is_behind.data(), *is_crossed = scratch.is_crossed.data();
   for (std::size_t i = 0; i < count; ++i) {
     const glm::vec3 place = sun.outlines.along_beam(points[i]);
     x[i] = place.x;
@@ -315,25 +322,22 @@ void DirectLight::sun_transmission(const Sun& sun, const SunlitSlot& slot, std::
     share[i] = 1;
   }
   for (const int k : slot.passages) {
-    sun.outlines.mark_behind(k, x, y, z, is_behind);
+    sun.outlines.mark_behind(k, scratch.x, scratch.y, scratch.z, scratch.is_behind);
     const float transmittance = sun.transmittance[k];
     for (std::size_t i = 0; i < count; ++i) {
       share[i] *= is_behind[i] ? transmittance : 1.f;
       is_crossed[i] |= is_behind[i];
     }
   }
-  rays.clear();
-  index.clear();
+  std::size_t ray_count = 0;
   for (std::size_t i = 0; i < count; ++i) {
     if (!is_crossed[i]) share[i] = 0;
-    if (share[i] <= 0) continue;
-    rays.push_back({points[i], sun.beam.direction_to_source});
-    index.push_back(i);
+    if (share[i] > 0) scratch.rays[ray_count++] = {points[i], sun.beam.direction_to_source};
   }
-  blocked.resize(rays.size());
-  rays_.occluded(RayScene::What::kOpaque, rays, blocked, RayScene::Order::kCoherent);
-  for (std::size_t k = 0; k < rays.size(); ++k)
-    if (blocked[k]) share[index[k]] = 0;
+  rays_.occluded(RayScene::What::kOpaque, {scratch.rays.data(), ray_count}, {scratch.blocked.data(), ray_count},
+                 RayScene::Order::kCoherent);
+  for (std::size_t i = 0, next = 0; i < count; ++i)
+    if (share[i] > 0 && scratch.blocked[next++]) share[i] = 0;
   ignore_small_openings(sun.beam.direction_to_source, points, share);
 }
 
