@@ -48,13 +48,6 @@ SparseRows transposed(const SparseRows& rows) {
   return result;
 }
 
-// 0 to 5: the axis, and its sense, that a normal is nearest to.
-int main_direction(glm::vec3 n) {
-  const glm::vec3 a = glm::abs(n);
-  const int axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
-  return 2 * axis + (n[axis] < 0);
-}
-
 }  // namespace
 
 Interreflection::Interreflection(const SparseRows& form_factors, const SparseRows& through,

@@ -10,14 +10,13 @@ namespace {
 
 constexpr int kLargestGroup = 64;  // patches
 
-// 0 to 5: the axis, and its sense, that a normal is nearest to.
+}  // namespace
+
 int main_direction(glm::vec3 n) {
   const glm::vec3 a = glm::abs(n);
   const int axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
   return 2 * axis + (n[axis] < 0);
 }
-
-}  // namespace
 
 PatchGroups::PatchGroups(const std::vector<PatchPlace>& places, const std::vector<float>& areas)
     : order_(places.size()), parent_of_patch_(places.size(), -1) {
