@@ -161,6 +161,16 @@ void Interreflection::cluster_means(const std::vector<Value>& values, std::vecto
   for (std::size_t c = 0; c < means.size(); ++c) means[c] /= std::max(cluster_area_[c], 1e-30f);
 }
 
+// What clusters receive of what they have not yet reflected.
+template <typename Value>
+void Interreflection::apply_operator(const std::vector<Value>& mean, std::vector<Value>& received) const {
+  parallel_indices(mean.size(), 32, [&](std::size_t c) {
+    Value all(0);
+    for (std::size_t k = 0; k < mean.size(); ++k) all += operator_[c * mean.size() + k] * mean[k];
+    received[c] = all;
+  });
+}
+
 // What is left over before anything has been reflected. Of bright patches it is the first reflection of what they send,
 // which itself is taken for done.
 template <typename Value>
@@ -199,15 +209,21 @@ void Interreflection::carry_on(const std::vector<Value>& left, std::vector<Value
     for (std::size_t i = 0; i < n; ++i) sum[i] = left[i] + to(Value(), reflectance_[i]) * received[i];
     cluster_means(sum, mean_after);
     for (std::size_t c = 0; c < m; ++c) mean[c] = mean_after[c] - mean[c];
-    parallel_indices(m, 32, [&](std::size_t c) {
-      Value all(0);
-      for (std::size_t k = 0; k < m; ++k) all += operator_[c * m + k] * mean[k];
-      carried[c] = all;
-    });
+    apply_operator(mean, carried);
     for (std::size_t i = 0; i < n; ++i) sum[i] += to(Value(), reflectance_[i]) * carried[cluster_of_[i]];
     for (std::size_t c = 0; c < m; ++c) mean[c] = mean_after[c] + to(Value(), cluster_reflectance_[c]) * carried[c];
   }
   for (std::size_t i = 0; i < n; ++i) radiosity[i] += sum[i];
+}
+
+// What is still left over reaches the irradiance as clusters see it, with all its further reflections.
+template <typename Value>
+void Interreflection::add_rest(const std::vector<Value>& left, std::vector<glm::vec3>& irradiance) const {
+  const auto m = static_cast<std::size_t>(cluster_count_);
+  std::vector<Value> mean, carried(m);
+  cluster_means(left, mean);
+  apply_operator(mean, carried);
+  for (std::size_t i = 0; i < irradiance.size(); ++i) irradiance[i] += colour_of(carried[cluster_of_[i]]);
 }
 
 // One cycle: returns what is then left over, relative to all flux.
@@ -238,8 +254,10 @@ int Interreflection::solve_as(const PatchLight& light, double tolerance, int max
   for (int number = 1; number <= maximum_cycles; ++number) {
     const double rest = cycle(light, left, radiosity, irradiance);
     const double shrinks_by = number > 1 ? rest / before : foretold_shrinking_;
-    if (!(rest > 0) || rest <= tolerance || (shrinks_by < 1 && rest * shrinks_by / (1 - shrinks_by) <= tolerance))
+    if (!(rest > 0) || rest <= tolerance || (shrinks_by < 1 && rest * shrinks_by / (1 - shrinks_by) <= tolerance)) {
+      add_rest(left, irradiance);
       return number;
+    }
     before = rest;
     if (after_cycle && !after_cycle(number, irradiance)) return 0;
   }

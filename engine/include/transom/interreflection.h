@@ -24,7 +24,8 @@ struct PatchLight {
 /// is carried through all further reflections by a likeness of the exchange, in which groups of patches stand for those
 /// that no smooth light tells apart. The likeness is solved in turn with the help of clusters (a few hundred, by place
 /// and orientation), among which all reflections are a matrix found beforehand. What likeness and clusters get wrong is
-/// the next cycle's remainder: the answer is that of the patches. [after Hackbusch 1985, multigrid of the second kind]
+/// the next cycle's remainder; the last is given to the clusters. The answer is that of the patches. [after Hackbusch
+/// 1985, multigrid of the second kind]
 ///
 /// Light is smooth once it has been reflected. Where it falls from a beam it is not: bright patches send theirs for
 /// themselves, by the columns of the exchange.
@@ -65,6 +66,10 @@ class Interreflection {
   template <typename Value>
   double cycle(const PatchLight& light, std::vector<Value>& left, std::vector<Value>& radiosity,
                std::vector<glm::vec3>& irradiance) const;
+  template <typename Value>
+  void add_rest(const std::vector<Value>& left, std::vector<glm::vec3>& irradiance) const;
+  template <typename Value>
+  void apply_operator(const std::vector<Value>& mean, std::vector<Value>& received) const;
   double measured_shrinking() const;
   template <typename Value>
   void carry_on(const std::vector<Value>& left, std::vector<Value>& radiosity) const;

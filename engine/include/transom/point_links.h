@@ -1,6 +1,7 @@
 /// @file How fixed points see the patches that beams light: found once for a geometry, used for every condition.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
@@ -46,6 +47,8 @@ class PointLinks {
 
  private:
   static constexpr std::size_t kBlock = 64;  // points
+  static constexpr float kLeastDistance2 =
+      1e-15f;  // keeps 0 / 0 out of weights that are 0; its square is a normal number
   /// What one patch is to all points. A seen share T is stored as 255 sqrt(T): 1 is exact, dark glass keeps its digits.
   struct Link {
     std::vector<int> block;          // blocks of points in front of the patch, ascending
@@ -85,7 +88,19 @@ class PointLinks {
   void link_near(Link& link, int slot, const KnownPoints& known) const;
   template <bool kIsGrey>
   void add_blocks(const std::vector<LitPatch>& lit, std::size_t chunk, std::vector<glm::vec3>& irradiance) const;
-  float point_weight(glm::vec3 centre, glm::vec3 normal, std::size_t point) const;
+  // Of what is stored of it.
+  static float seen_share(std::uint8_t seen) {
+    const float root = static_cast<float>(static_cast<int>(seen)) * (1.f / 255);
+    return root * root;
+  }
+  // Irradiance of a point per intensity along the normal of a small surface at `centre`, whatever stands between.
+  float point_weight(glm::vec3 centre, glm::vec3 normal, std::size_t point) const {
+    const float dx = centre.x - x_[point], dy = centre.y - y_[point], dz = centre.z - z_[point];
+    const float height = std::max(0.f, -(dx * normal.x + dy * normal.y + dz * normal.z));
+    const float cosine = std::max(0.f, dx * nx_[point] + dy * ny_[point] + dz * nz_[point]);
+    const float distance2 = std::max(kLeastDistance2, dx * dx + dy * dy + dz * dz);
+    return height * cosine / (distance2 * distance2);
+  }
   void weigh_far(Link& link, int slot) const;
   LitPatch lit_patch(std::shared_ptr<const Link> link, std::span<const BrightElement> bright, std::size_t first,
                      std::size_t last) const;
