@@ -10,12 +10,11 @@
 namespace transom {
 namespace {
 
-constexpr int kShift = 13;                         // bits of a float's mantissa that a half has not
-constexpr std::uint32_t kBias = 112u << 23;        // of the exponent of a float against that of a half
-constexpr std::uint32_t kLeast = 113u << 23;       // 2^-14: below it a half is 0
-constexpr int kLargest = 14;                       // exponent of the largest value
-constexpr float kWidened = 5.192296858534828e33f;  // 2^112: what a widened half lacks
-constexpr std::uint32_t kGoldenRatio = 5063;       // of 2^13: multiples of it are spread evenly
+constexpr int kShift = 13;                    // bits of a float's mantissa that a half has not
+constexpr std::uint32_t kBias = 112u << 23;   // of the exponent of a float against that of a half
+constexpr std::uint32_t kLeast = 113u << 23;  // 2^-14: below it a half is 0
+constexpr int kLargest = 14;                  // exponent of the largest value
+constexpr std::uint32_t kGoldenRatio = 5063;  // of 2^13: multiples of it are spread evenly
 
 // Rounds up or down, so that many equal values have their mean: `number` tells them apart.
 std::uint16_t half_of(float value, std::size_t number) {
@@ -25,8 +24,17 @@ std::uint16_t half_of(float value, std::size_t number) {
   return static_cast<std::uint16_t>((bits >> 16 & 0x8000u) | (size - kBias + threshold) >> kShift);
 }
 
-// A half, or four, as floats that lack a factor of 2^112: moved to where a float has its exponent and mantissa. The
-// shift repeats the sign, which is masked.
+// A half, or four, as floats.
+#ifdef __F16C__
+inline float widened(std::uint16_t half) {
+  return _cvtsh_ss(half);
+}
+inline __m128 widened(const std::uint16_t* halves) {
+  return _mm_cvtph_ps(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(halves)));
+}
+constexpr float kWidened = 1;  // what a widened half lacks
+#else
+// Moved to where a float has its exponent and mantissa; the shift repeats the sign, which is masked.
 inline float widened(std::uint16_t half) {
   const auto moved = static_cast<std::int32_t>(static_cast<std::uint32_t>(half) << 16) >> 3;
   return std::bit_cast<float>(static_cast<std::uint32_t>(moved) & 0x8fffffffu);
@@ -36,6 +44,8 @@ inline __m128 widened(const std::uint16_t* halves) {
       _mm_unpacklo_epi16(_mm_setzero_si128(), _mm_loadl_epi64(reinterpret_cast<const __m128i*>(halves))), 3);
   return _mm_castsi128_ps(_mm_and_si128(moved, _mm_set1_epi32(static_cast<int>(0x8fffffffu))));
 }
+constexpr float kWidened = 5.192296858534828e33f;  // 2^112: what a widened half lacks
+#endif
 
 // Four whole numbers as floats.
 inline __m128 counted(const std::uint16_t* numbers) {
