@@ -96,7 +96,8 @@ std::shared_ptr<const GatherRow> Engine::surroundings_of_patch(int slot,
 
 // Samples of a patch depend on where it is alone.
 std::uint32_t Engine::patch_seed(int slot) const {
-  return place_seed(options_.seed, kPatchStream, {mesh_->middle_of(slot).position, mesh_->normal_of(slot)});
+  return relative_place_seed(options_.seed, kPatchStream, {mesh_->middle_of(slot).position, mesh_->normal_of(slot)},
+                             faces_.extent);
 }
 
 int Engine::Known::patch(int slot) const {
