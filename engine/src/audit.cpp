@@ -24,6 +24,30 @@ glm::dvec3 Engine::through_product(const Panel& panel, const std::vector<glm::dv
   return sum;
 }
 
+// What lies before an opening may be indoors itself, such as the gap between two panes: then light of the rooms enters
+// there. rays: outwards from an opening that is no panel. Sum of the radiances that come along those that end indoors.
+glm::dvec3 Engine::into_gaps(int face_index, std::span<const Ray> rays,
+                             const std::function<glm::vec3(int element)>& radiosity) const {
+  const Face& face = faces_.faces[static_cast<std::size_t>(face_index)];
+  const float lift = 2 * faces_.ray_offset();  // from one side of the opening to the other
+  std::vector<Hit> ends(rays.size()), begins(rays.size());
+  rays_->intersect(RayScene::What::kAll, rays, ends);
+  std::vector<Ray> back(rays.begin(), rays.end());
+  for (Ray& ray : back) ray = {ray.origin - lift * face.normal, -ray.direction};
+  rays_->intersect(RayScene::What::kOpaque, back, begins);
+  glm::dvec3 sum(0);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (ends[i].face < 0 || begins[i].face < 0) continue;
+    const int patch = patch_of_slot_[mesh_->element_at(ends[i]) / mesh_->elements_per_slot()];
+    if (patch < 0 || !is_interior_[patch] || faces_.is_inside_solid(begins[i].face, begins[i].side)) continue;
+    back[i].t_far = begins[i].t;
+    const float passed =
+        rays_->opening_transmittance(face_index, back[i].direction) * rays_->transmittance(back[i]) / kPi;
+    sum += glm::dvec3(passed * radiosity(mesh_->element_at(begins[i])));
+  }
+  return sum;
+}
+
 // Flux in is sampled here from the openings outwards, with rays of its own: nothing of the solve is used but the
 // radiosity of outdoor surfaces.
 EnergyAudit Engine::audit(const Lighting& lighting, int rays_per_opening) const {
@@ -79,7 +103,11 @@ EnergyAudit Engine::audit(const Lighting& lighting, int rays_per_opening) const 
             share * (bin == ground ? condition.ground_luminance : condition.sky_luminance[bin] * condition.sky_colour));
       }
     }
-    if (panel) audit.in_sky += through_product(*panel, arriving);
+    if (panel)
+      audit.in_sky += through_product(*panel, arriving);
+    else
+      audit.in_reflected +=
+          static_cast<double>(kPi * flux_share) * into_gaps(static_cast<int>(f), rays, element_radiosity);
     for (const Beam& beam : condition.beams) {
       const float cosine = glm::dot(face.normal, beam.direction_to_source);
       if (cosine <= 0 || beam.opening != (panel ? opening : -1)) continue;

@@ -25,7 +25,9 @@ static_assert(kPatternPoints >= kRefinedSamplesPerElement && kPatternPoints >= k
 
 }  // namespace
 
-// Places of samples in an element, evenly spread: a choice of patterns, so that neighbours do not repeat each other.
+// Places of samples in an element, evenly spread: one of some patterns, moved by an offset of the element's own
+// [Cranley & Patterson 1976], so that no two elements repeat each other. Neighbours that did would err alike about
+// stripes of light.
 class DirectLight::Patterns {
  public:
   explicit Patterns(std::uint32_t seed) : seed_(seed) {
@@ -34,9 +36,23 @@ class DirectLight::Patterns {
       for (std::uint32_t i = 0; i < kPatternPoints; ++i) points_.push_back(sequence.point2(i));
     }
   }
-  std::span<const glm::vec2> of(int element) const {
-    const std::uint32_t pattern = hash_seed(seed_, static_cast<std::uint64_t>(element)) % kPatternCount;
-    return {&points_[static_cast<std::size_t>(pattern) * kPatternPoints], kPatternPoints};
+
+  class Pattern {
+   public:
+    Pattern(const glm::vec2* points, glm::vec2 offset) : points_(points), offset_(offset) {}
+    glm::vec2 operator[](int i) const {
+      const glm::vec2 moved = points_[i] + offset_;
+      return {moved.x < 1 ? moved.x : moved.x - 1, moved.y < 1 ? moved.y : moved.y - 1};
+    }
+
+   private:
+    const glm::vec2* points_;
+    glm::vec2 offset_;
+  };
+  Pattern of(int element) const {
+    const std::uint32_t hash = hash_seed(seed_, static_cast<std::uint64_t>(element));
+    const auto part = [hash](int shift) { return static_cast<float>(hash >> shift & 0xfffu) / 4096; };
+    return {&points_[static_cast<std::size_t>(hash % kPatternCount) * kPatternPoints], {part(8), part(20)}};
   }
 
  private:
@@ -156,9 +172,9 @@ std::vector<glm::vec3> DirectLight::points_on(int slot_index, const Corners& cor
   // A cell, and a quad's element in it, is the affine or bilinear picture of its own square or triangle.
   const glm::vec3 a = corners[0], ab = corners[1] - a, ac = corners[3] - a, twist = corners[2] - a - ab - ac;
   for (const int e : elements) {
-    const std::span<const glm::vec2> pattern = patterns.of(slot_index * per_slot + e);
+    const Patterns::Pattern pattern = patterns.of(slot_index * per_slot + e);
     for (int i = 0; i < samples; ++i) {
-      const glm::vec2 local = mesh_.sample_local(slot.face, pattern[static_cast<std::size_t>(i)]);
+      const glm::vec2 local = mesh_.sample_local(slot.face, pattern[i]);
       if (is_quad) {
         const glm::vec2 u = (glm::vec2(e % edge, e / edge) + local) / static_cast<float>(edge);
         points.push_back(a + u.x * ab + u.y * ac + u.x * u.y * twist);

@@ -74,7 +74,6 @@ void Engine::solve(const Engine* solved) {
     const TracePhase phase(trace_, "transfer");
     assemble_transfer(known);
     link_panels();
-    lit_by_sources_ = direct_light_->deposit({}, receivers_, hash_seed(options_.seed, kBeamStream));
   }
   if (options_.method == Method::kClassic) {
     const TracePhase phase(trace_, "forward rays");
@@ -82,6 +81,7 @@ void Engine::solve(const Engine* solved) {
   } else {
     {
       const TracePhase phase(trace_, "likeness");
+      lit_by_sources_ = direct_light_->deposit({}, receivers_, hash_seed(options_.seed, kBeamStream));
       find_smooth_lights();
       interreflection_->prepare(smooth_lights_);
     }

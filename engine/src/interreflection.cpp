@@ -17,7 +17,8 @@ constexpr std::size_t kGrain = 128;
 constexpr float kLikeness = 3e-4f;      // of what a patch receives: what a group may err by
 constexpr std::size_t kProbeStep = 37;  // patches, between those that are lit to measure how fast light converges
 constexpr double kSafety = 2;           // on what has been measured
-constexpr int kInnerCycles = 3;         // with the likeness: they leave about as much as it is wrong by
+constexpr int kLeastInnerCycles = 3, kMostInnerCycles = 5;  // with the likeness
+constexpr double kWantedShrinking = 0.04;  // by a cycle: more inner ones are taken where these do not do
 
 // Light of one channel, and of three.
 float to(float, glm::vec3 colour) {
@@ -135,7 +136,14 @@ void Interreflection::prepare(std::span<const std::vector<float>> smooth_lights)
   SparseRows all;
   for (const std::vector<Share>& row : rows) all.append(row);
   likeness_ = CompactRows(all);
-  foretold_shrinking_ = lights.empty() ? 1 : std::min(1., kSafety * measured_shrinking());
+  foretold_shrinking_ = 1;
+  if (lights.empty()) return;
+  double shrinking = 1;
+  for (inner_cycles_ = kLeastInnerCycles;; ++inner_cycles_) {
+    shrinking = measured_shrinking();
+    if (shrinking <= kWantedShrinking || inner_cycles_ == kMostInnerCycles) break;
+  }
+  foretold_shrinking_ = std::min(1., kSafety * shrinking);
 }
 
 // How much less is left over after a second cycle than after a first, of light on patches here and there.
@@ -202,7 +210,7 @@ void Interreflection::carry_on(const std::vector<Value>& left, std::vector<Value
   const std::size_t n = areas_.size(), m = static_cast<std::size_t>(cluster_count_);
   std::vector<Value> sum = left, received(n), mean, mean_after, carried(m);
   cluster_means(sum, mean);
-  for (int cycle = 0; cycle < kInnerCycles; ++cycle) {
+  for (int cycle = 0; cycle < inner_cycles_; ++cycle) {
     groups_.append_means(sum);
     const HalfColours sent(sum);
     parallel_indices(n, kGrain, [&](std::size_t i) { received[i] = to(Value(), likeness_.dot(i, sent)); });

@@ -191,7 +191,7 @@ class Engine:
     def _core_condition(self, condition: Condition) -> _engine.Condition:
         sky_picture = condition.environment_image(SKY_PICTURE_HEIGHT, single=True)
         core_condition = _engine.Condition(
-            condition.fast_bin_luminance(self.sky_bins),
+            condition.bin_luminance(self.sky_bins, single=True).astype(np.float32, copy=False),
             _triple(condition.sky_rgb),
             _triple(condition.ground_luminance_rgb),
             np.ascontiguousarray(sky_picture, dtype=np.float32),

@@ -18,6 +18,7 @@
 namespace transom {
 namespace {
 
+using test::into_the_room;
 using test::roof_light_room;
 using test::tregenza;
 using test::uniform_sky;
@@ -44,15 +45,6 @@ Condition hour(int number) {
     condition.beams.push_back({glm::normalize(glm::vec3(0.1f * static_cast<float>(number % 7) - 0.3f, 0.1f, 1)),
                                glm::vec3(60000, 58000, 50000)});
   return condition;
-}
-
-View into_the_room() {
-  View view;
-  view.position = {0.5, 0.5, 1.5};
-  view.target = {3, 3, 0};
-  view.width = 24;
-  view.height = 18;
-  return view;
 }
 
 void expect_same(const Lighting& a, const Lighting& b) {

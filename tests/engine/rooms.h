@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "transom/engine.h"
+#include "transom/view.h"
 
 namespace transom::test {
 
@@ -68,6 +69,16 @@ inline SceneGeometry roof_light_room(float reflectance, float transmittance = 1)
   add_quad(scene, {0, y, z}, {0, 0, z}, {a, a, z}, {a, b, z}, 0);
   add_quad(scene, {a, a, z}, {b, a, z}, {b, b, z}, {a, b, z}, 1);
   return scene;
+}
+
+/// A small picture from one corner of that room, of its floor and what stands on it.
+inline View into_the_room() {
+  View view;
+  view.position = {0.5, 0.5, 1.5};
+  view.target = {3, 3, 0};
+  view.width = 24;
+  view.height = 18;
+  return view;
 }
 
 /// Irradiance of points, found in one go.

@@ -93,7 +93,7 @@ def test_bin_means_converge_to_one_sky_whatever_the_bins() -> None:
 def test_single_precision_gives_the_same_bins(sky: str) -> None:
     condition = resolve_condition(ConditionSpec("a", "2026-03-21T10:00", sky), SITE)
     bins = SkyBins(4)
-    fast = condition.fast_bin_luminance(bins)
+    fast = condition.bin_luminance(bins, single=True)
     assert fast.dtype == np.float32
     assert fast == pytest.approx(condition.bin_luminance(bins), rel=1e-5)
 

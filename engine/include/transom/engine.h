@@ -1,6 +1,7 @@
 /// @file The engine: solve once for a geometry, relight for every condition, then look at it from anywhere.
 #pragma once
 
+#include <functional>
 #include <glm/glm.hpp>
 #include <memory>
 #include <span>
@@ -64,12 +65,13 @@ struct SolveFacts {
 /// Flux balance of the interior [lm], linear RGB. Interior: every side that light from the rooms' side of the openings,
 /// or from emitters, reaches without passing an opening.
 struct EnergyAudit {
-  glm::dvec3 in_sky{0};        ///< sky and ground light through the openings, sampled from the openings
-  glm::dvec3 in_beams{0};      ///< the same for beams
-  glm::dvec3 in_reflected{0};  ///< light that outdoor surfaces send through the openings
-  glm::dvec3 in_emitted{0};    ///< emitting surfaces and point sources
-  glm::dvec3 absorbed{0};      ///< by opaque surfaces
-  glm::dvec3 out{0};           ///< into the room side of openings: transmitted or absorbed there
+  glm::dvec3 in_sky{0};    ///< sky and ground light through the openings, sampled from the openings
+  glm::dvec3 in_beams{0};  ///< the same for beams
+  glm::dvec3 in_reflected{
+      0};                    ///< light that surfaces before and, into gaps between panes, behind openings send through
+  glm::dvec3 in_emitted{0};  ///< emitting surfaces and point sources
+  glm::dvec3 absorbed{0};    ///< by opaque surfaces
+  glm::dvec3 out{0};         ///< into the room side of openings: transmitted or absorbed there
   glm::dvec3 in() const { return in_sky + in_beams + in_reflected + in_emitted; }
 };
 
@@ -224,6 +226,7 @@ class Engine {
   std::vector<int> beam_slots() const;
   std::vector<BrightElement> bright_elements(std::span<const LitElement> lit) const;
   std::vector<glm::vec3> element_direct(const Lighting& lighting) const;
+  glm::dvec3 into_gaps(int face, std::span<const Ray> rays, const std::function<glm::vec3(int)>& radiosity) const;
   glm::dvec3 through_product(const Panel& panel, const std::vector<glm::dvec3>& arriving) const;
 
   SceneGeometry scene_;

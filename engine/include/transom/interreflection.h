@@ -53,7 +53,6 @@ class Interreflection {
   void set_reflectance(std::size_t patch, glm::vec3 reflectance) { reflectance_[patch] = reflectance; }
 
   int cluster_count() const { return cluster_count_; }
-  const PatchGroups& groups() const { return groups_; }
 
  private:
   void find_clusters(const std::vector<PatchPlace>& places);
@@ -83,6 +82,7 @@ class Interreflection {
   std::vector<float> areas_;
   PatchGroups groups_;
   CompactRows likeness_;           // of F + K, over patches and groups
+  int inner_cycles_ = 3;           // with the likeness, in each cycle
   double foretold_shrinking_ = 1;  // of what is left over, by a cycle after the first
   int cluster_count_ = 0;
   std::vector<int> cluster_of_;

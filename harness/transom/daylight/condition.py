@@ -18,6 +18,7 @@ from transom.daylight.environment import environment_image
 from transom.daylight.sky_bins import SkyBins
 from transom.daylight.sky_choice import SkyChoice, parse_sky
 from transom.daylight.sky_model import (
+    Floats,
     SkyModel,
     SkyPattern,
     relative_horizontal_illuminance,
@@ -71,18 +72,14 @@ class Condition:
         }
         return hashlib.sha256(json.dumps(_rounded(content), sort_keys=True).encode()).hexdigest()
 
-    def bin_luminance(self, bins: SkyBins) -> Float64:
-        """Mean luminance of the sky over each bin's solid angle (bins.count,) [cd/m²]; the sun's disc is not in it."""
-        directions, weights = bins.quadrature()
-        luminance = self.sky.luminance(directions.reshape(-1, 3)).reshape(weights.shape)
-        mean: Float64 = (luminance * weights).sum(axis=1)
-        return mean
+    def bin_luminance(self, bins: SkyBins, *, single: bool = False) -> Floats:
+        """Mean luminance of the sky over each bin's solid angle (bins.count,) [cd/m²]; the sun's disc is not in it.
 
-    def fast_bin_luminance(self, bins: SkyBins) -> Float32:
-        """`bin_luminance` in single precision: within 1e-5 of it, and several times as fast."""
-        directions, weights = bins.single_quadrature()
+        single: calculated in single precision, within 1e-5 and several times as fast.
+        """
+        directions, weights = bins.quadrature(single=single)
         luminance = self.sky.luminance(directions.reshape(-1, 3)).reshape(weights.shape)
-        mean: Float32 = np.einsum("ij,ij->i", luminance, weights)
+        mean: Floats = (luminance * weights).sum(axis=1)
         return mean
 
     def environment_image(self, height: int, *, single: bool = False) -> Float32:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Float32 = NDArray[np.float32]
+Floats = NDArray[np.floating[Any]]
 Float64 = NDArray[np.float64]
 Int32 = NDArray[np.int32]
 
@@ -47,8 +48,9 @@ class SkyBins:
         row = np.repeat(np.arange(len(self.row_counts)), self.row_counts)
         turn = (np.arange(self.count) - self.row_offsets[row] + 0.5) / self.row_counts[row]
         self.directions: Float64 = _unit_vectors(altitudes[row], 2 * math.pi * turn)
-        self._nodes, self._weights = self._quadrature()
-        self._single_nodes, self._single_weights = self._nodes.astype(np.float32), self._weights.astype(np.float32)
+        nodes, weights = self._quadrature()
+        self._double_quadrature: tuple[Floats, Floats] = (nodes, weights)
+        self._single_quadrature: tuple[Floats, Floats] = (nodes.astype(np.float32), weights.astype(np.float32))
 
     def index(self, directions: Float64) -> Int32:
         """Bin of each direction (N, 3), unit vectors -> (N,); -1 below the horizon."""
@@ -58,13 +60,12 @@ class SkyBins:
         column = np.minimum(turn * self.row_counts[row], self.row_counts[row] - 1).astype(np.int32)
         return np.where(altitude < 0, -1, self.row_offsets[row] + column).astype(np.int32)
 
-    def quadrature(self) -> tuple[Float64, Float64]:
-        """Unit vectors (count, Q, 3) and weights (count, Q), summing to 1 a bin, for means over the solid angle."""
-        return self._nodes, self._weights
+    def quadrature(self, *, single: bool = False) -> tuple[Floats, Floats]:
+        """Unit vectors (count, Q, 3) and weights (count, Q), summing to 1 a bin, for means over the solid angle.
 
-    def single_quadrature(self) -> tuple[Float32, Float32]:
-        """The same in single precision."""
-        return self._single_nodes, self._single_weights
+        single: in single precision.
+        """
+        return self._single_quadrature if single else self._double_quadrature
 
     def _quadrature(self) -> tuple[Float64, Float64]:
         """Gauss-Legendre in sin(altitude) and azimuth: 10 x 10 nodes in Tregenza's bins, 4 x 4 from m = 2 up."""

@@ -68,15 +68,6 @@ SolveOptions small_options() {
   return options;
 }
 
-View into_the_room() {
-  View view;
-  view.position = {0.5, 0.5, 1.5};
-  view.target = {3, 3, 0};
-  view.width = 24;
-  view.height = 18;
-  return view;
-}
-
 // Light is changed after it was published, while another thread draws from it in the loops of the engine.
 void race_for_a_state() {
   const Engine engine(test::roof_light_room(0.6f), test::tregenza(), small_options());
@@ -87,7 +78,7 @@ void race_for_a_state() {
   at_once([&](int thread) {
     both.wait();
     if (thread == 0)
-      FrameRenderer(engine).render(into_the_room(), *state, {});
+      FrameRenderer(engine).render(test::into_the_room(), *state, {});
     else
       for (glm::vec3& light : const_cast<Lighting&>(*state).node_indirect) light *= 2.f;
   });
@@ -106,7 +97,7 @@ void no_race() {
   RelightWorker worker(engine);
   worker.submit(test::uniform_sky(1000));
   const std::shared_ptr<const Lighting> state = worker.finished().lighting;
-  at_once([&](int) { FrameRenderer(engine).render(into_the_room(), *state, {}); });
+  at_once([&](int) { FrameRenderer(engine).render(test::into_the_room(), *state, {}); });
 }
 
 }  // namespace
