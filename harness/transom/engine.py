@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from transom import _engine
 from transom.daylight.condition import Condition
+from transom.daylight.environment import dome_image
 from transom.daylight.sky_bins import SkyBins
 from transom.engine_scene import engine_geometry, fenestration_of, what_else_changed
 from transom.errors import InputError
@@ -28,8 +29,8 @@ Method = Literal["gather", "classic"]
 SKY_SUBDIVISION = 4
 """Reinhart's MF: 2305 bins. Coarser bins blur the sun's surroundings in a clear sky."""
 
-SKY_PICTURE_HEIGHT = 128
-"""Rows of the sky picture that is seen through openings."""
+SKY_PICTURE_HEIGHT = 64
+"""Rows, from zenith to horizon, of the picture of the sky that is seen through openings."""
 
 
 @dataclass(frozen=True)
@@ -189,12 +190,11 @@ class Engine:
             raise InputError(str(error), file=self.scene.file, field=f"conditions.{condition.name}") from None
 
     def _core_condition(self, condition: Condition) -> _engine.Condition:
-        sky_picture = condition.environment_image(SKY_PICTURE_HEIGHT, single=True)
         core_condition = _engine.Condition(
             condition.bin_luminance(self.sky_bins, single=True).astype(np.float32, copy=False),
             _triple(condition.sky_rgb),
             _triple(condition.ground_luminance_rgb),
-            np.ascontiguousarray(sky_picture, dtype=np.float32),
+            dome_image(condition.sky, SKY_PICTURE_HEIGHT),
         )
         if condition.sun_direction is not None:
             sun = _triple(condition.sun_direction)
