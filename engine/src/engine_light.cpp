@@ -119,6 +119,22 @@ void Engine::find_smooth_radiosity(Lighting& lighting) const {
                                          patch_reflectance_[p] * (lighting.patch_irradiance[p] - lighting.patch_sun[p]);
 }
 
+// Radiosity of every node, then of every patch, but for what beams light.
+std::vector<glm::vec4> Engine::sent_by_nodes_and_patches(const Lighting& lighting) const {
+  const std::size_t node_count = lighting.node_indirect.size(), patch_count = lighting.patch_smooth_radiosity.size();
+  std::vector<glm::vec4> sent(node_count + patch_count);
+  parallel_indices(node_count, 64, [&](std::size_t i) {
+    const int face = nodes_->surface(i) / 2;
+    const glm::vec3 emitted = kPi * scene_.materials[faces_.faces[face].material].luminance;
+    sent[i] =
+        glm::vec4((connects_emitters_ ? glm::vec3(0) : emitted) +
+                      reflectance(face, nodes_->surface(i) % 2) * (lighting.node_sky[i] + lighting.node_indirect[i]),
+                  0);
+  });
+  for (std::size_t p = 0; p < patch_count; ++p) sent[node_count + p] = glm::vec4(lighting.patch_smooth_radiosity[p], 0);
+  return sent;
+}
+
 // Indirect light at nodes, from the irradiance of patches.
 void Engine::gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& first_reflection) const {
   const TracePhase phase(trace_, "gather");
@@ -131,16 +147,7 @@ void Engine::gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& f
     lighting.node_indirect[i] = first_reflection[i] + node_patches_.dot(i, sent_by_patches);
   });
   // What is seen close by is not as even as its patch: the nodes on it, as they are now, speak for it.
-  std::vector<glm::vec4> sent(first_reflection.size());
-  parallel_indices(sent.size(), 64, [&](std::size_t i) {
-    const int face = nodes_->surface(i) / 2;
-    const glm::vec3 emitted = kPi * scene_.materials[faces_.faces[face].material].luminance;
-    sent[i] =
-        glm::vec4((connects_emitters_ ? glm::vec3(0) : emitted) +
-                      reflectance(face, nodes_->surface(i) % 2) * (lighting.node_sky[i] + lighting.node_indirect[i]),
-                  0);
-  });
-  sent.insert(sent.end(), radiosity.begin(), radiosity.end());
+  const std::vector<glm::vec4> sent = sent_by_nodes_and_patches(lighting);
   parallel_indices(first_reflection.size(), 64,
                    [&](std::size_t i) { lighting.node_indirect[i] += glm::vec3(node_near_.dot(i, sent)); });
 }
@@ -187,8 +194,9 @@ std::vector<glm::vec3> Engine::element_direct(const Lighting& lighting) const {
 
 Sensors Engine::sensors(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals,
                         GatherSamples samples) const {
-  Sensors sensors{points, normals, samples, std::vector<Node>(points.size()), {}, {}};
+  Sensors sensors{points, normals, samples, std::vector<Node>(points.size()), {}, {}, {}};
   std::vector<GatherRow> rows(points.size());
+  std::vector<std::vector<Share>> resolved(points.size());
   parallel_indices(points.size(), 1, [&](std::size_t i) {
     const glm::vec3 normal = glm::normalize(normals[i]);
     sensors.nodes[i] = {glm::vec3(points[i] - faces_.origin) + faces_.ray_offset() * normal, normal};
@@ -196,23 +204,47 @@ Sensors Engine::sensors(const std::vector<glm::dvec3>& points, const std::vector
         gatherer_->gather_at_point(sensors.nodes[i], samples, hash_seed(options_.seed, hash_seed(kSensorStream, i)));
     rows[i].reached.insert(rows[i].reached.end(), rows[i].through.begin(), rows[i].through.end());
     rows[i].reached = to_patches(rows[i].reached);
+    if (nodes_) resolved[i] = resolved_by_nodes(rows[i].near);
   });
-  for (const GatherRow& row : rows) {
-    sensors.sky.append(row.sky);
-    sensors.patches.append(row.reached);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    sensors.sky.append(rows[i].sky);
+    sensors.patches.append(rows[i].reached);
+    sensors.resolved.append(resolved[i]);
   }
   return sensors;
+}
+
+// What elements send as the nodes around them say, less what their patches do.
+std::vector<Share> Engine::resolved_by_nodes(const std::vector<Share>& elements) const {
+  const int per_slot = mesh_->elements_per_slot(), node_count = static_cast<int>(nodes_->nodes().size());
+  std::vector<Share> row;
+  for (const Share& share : elements) {
+    const int patch = patch_of_slot_[share.index / per_slot];
+    if (patch < 0) continue;
+    const Slot slot = mesh_->slot(share.index / per_slot);
+    const glm::vec2 middle = mesh_->grid(slot.face).is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3),
+                    st = mesh_->element_parameters(slot.face, slot.cell, share.index % per_slot, middle);
+    const NodeShares nodes =
+        nodes_->interpolate(slot.face, slot.side, st, mesh_->lifted_position(slot.face, slot.side, st));
+    if (nodes.count == 0) continue;
+    for (int k = 0; k < nodes.count; ++k) row.push_back({nodes.node[k], share.weight * nodes.weight[k]});
+    row.push_back({node_count + patch, -share.weight});
+  }
+  merge_shares(row);
+  return row;
 }
 
 std::vector<Irradiance> Engine::illuminance(const Lighting& lighting, const Sensors& sensors) const {
   std::vector<Irradiance> result(sensors.nodes.size());
   const FirstBounce first_bounce(*mesh_, *rays_, lighting.bright_elements);
+  const std::vector<glm::vec4> sent = sent_by_nodes_and_patches(lighting);
   parallel_indices(result.size(), 1, [&](std::size_t i) {
     const Node& node = sensors.nodes[i];
     result[i].direct = direct_light_->illuminance(lighting.condition.beams, node.position, node.normal);
     result[i].sky = sky_light(lighting, sensors.sky, i);
     result[i].indirect = first_bounce.irradiance(node.position, node.normal, FirstBounce::Rays::kMany) +
-                         sensors.patches.dot(i, lighting.patch_smooth_radiosity);
+                         sensors.patches.dot(i, lighting.patch_smooth_radiosity) +
+                         glm::vec3(sensors.resolved.dot(i, sent));
   });
   return result;
 }

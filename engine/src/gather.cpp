@@ -50,7 +50,7 @@ Gatherer::Gatherer(const LightMesh& mesh, const RayScene& rays, const std::vecto
 }
 
 template <typename OriginOf>
-GatherRow Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, bool tells_near) const {
+GatherRow Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, Elements told) const {
   const SobolSequence points(seed);
   const std::vector<std::uint32_t>& order = coherent_order(count);
   Ray rays[kBlock];
@@ -65,13 +65,13 @@ GatherRow Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std:
       const Origin origin = origin_of(glm::vec2(u.z, u.w));
       rays[i] = {origin.position, frame_from_normal(origin.normal) * sample_cosine_hemisphere({u.x, u.y})};
     }
-    add_hits({rays, static_cast<std::size_t>(size)}, tells_near, tally);
+    add_hits({rays, static_cast<std::size_t>(size)}, told, tally);
   }
   return std::move(tally).row(count, mesh_.faces().extent);
 }
 
 // Casts rays and counts what they meet.
-void Gatherer::add_hits(std::span<const Ray> rays, bool tells_near, HemisphereTally& tally) const {
+void Gatherer::add_hits(std::span<const Ray> rays, Elements told, HemisphereTally& tally) const {
   Hit hits[kBlock];
   for (std::size_t begin = 0; begin < rays.size(); begin += kBlock) {
     const std::span<const Ray> block = rays.subspan(begin, std::min<std::size_t>(kBlock, rays.size() - begin));
@@ -84,8 +84,8 @@ void Gatherer::add_hits(std::span<const Ray> rays, bool tells_near, HemisphereTa
       } else {
         const int slot = mesh_.slot_at(hits[i]);
         tally.slots.push_back(slot);
-        if (tells_near && hits[i].t < near_distance_[static_cast<std::size_t>(slot)])
-          tally.near.push_back(mesh_.element_at(hits[i]));
+        const float near = told == Elements::kNone ? 0 : near_distance_[static_cast<std::size_t>(slot)];
+        if (hits[i].t < near || (told == Elements::kAll && near > 0)) tally.near.push_back(mesh_.element_at(hits[i]));
         tally.add_distance(hits[i].t, mesh_.faces());
       }
     }
@@ -200,7 +200,7 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
 
 GatherRow Gatherer::surroundings_of_point(const Node& point, GatherSamples samples, std::uint32_t seed) const {
   const auto origin_of = [&](glm::vec2) { return Origin{point.position, point.normal}; };
-  return gather_hemisphere(origin_of, samples.hemisphere, seed, true);
+  return gather_hemisphere(origin_of, samples.hemisphere, seed, Elements::kNear);
 }
 
 void Gatherer::look_through_openings(const Node& point, GatherSamples samples, std::uint32_t seed,
@@ -220,7 +220,7 @@ auto Gatherer::places_on(int slot) const {
 }
 
 GatherRow Gatherer::surroundings_of_patch(int slot, GatherSamples samples, std::uint32_t seed) const {
-  return gather_hemisphere(places_on(slot), samples.hemisphere, seed, false);
+  return gather_hemisphere(places_on(slot), samples.hemisphere, seed, Elements::kNone);
 }
 
 void Gatherer::look_through_openings(int slot, GatherSamples samples, std::uint32_t seed, GatherRow& row) const {
@@ -233,7 +233,7 @@ void Gatherer::look_through_openings(int slot, GatherSamples samples, std::uint3
 // Casts those rays again that may meet what has changed, in both states. False: their answers do not go together.
 template <typename OriginOf>
 bool Gatherer::gather_again(const OriginOf& origin_of, const Node& middle, float radius, int count, std::uint32_t seed,
-                            bool tells_near, const Gatherer& before, const SceneChange& change, GatherRow& row) const {
+                            Elements told, const Gatherer& before, const SceneChange& change, GatherRow& row) const {
   const HemisphereCells& cells = HemisphereCells::of(coherent_bits(count));
   thread_local std::vector<char> is_met;
   thread_local std::vector<Ray> rays;
@@ -259,8 +259,8 @@ bool Gatherer::gather_again(const OriginOf& origin_of, const Node& middle, float
   }
   if (rays.empty()) return true;
   HemisphereTally lost, found;
-  before.add_hits(rays, tells_near, lost);
-  add_hits(rays, tells_near, found);
+  before.add_hits(rays, told, lost);
+  add_hits(rays, told, found);
   std::erase_if(lost.slots, [&](int& slot) { return (slot = change.slot_after(slot)) < 0; });
   const int per_slot = mesh_.elements_per_slot();
   std::erase_if(lost.near, [&](int& element) {
@@ -274,14 +274,14 @@ bool Gatherer::gather_again(const OriginOf& origin_of, const Node& middle, float
 GatherRow Gatherer::surroundings_of_point(const Node& point, GatherSamples samples, std::uint32_t seed, GatherRow known,
                                           const Gatherer& before, const SceneChange& change) const {
   const auto origin_of = [&](glm::vec2) { return Origin{point.position, point.normal}; };
-  if (gather_again(origin_of, point, 0, samples.hemisphere, seed, true, before, change, known)) return known;
+  if (gather_again(origin_of, point, 0, samples.hemisphere, seed, Elements::kNear, before, change, known)) return known;
   return surroundings_of_point(point, samples, seed);
 }
 
 GatherRow Gatherer::surroundings_of_patch(int slot, GatherSamples samples, std::uint32_t seed, GatherRow known,
                                           const Gatherer& before, const SceneChange& change) const {
-  if (gather_again(places_on(slot), mesh_.middle_of(slot), radius_of(slot), samples.hemisphere, seed, false, before,
-                   change, known))
+  if (gather_again(places_on(slot), mesh_.middle_of(slot), radius_of(slot), samples.hemisphere, seed, Elements::kNone,
+                   before, change, known))
     return known;
   return surroundings_of_patch(slot, samples, seed);
 }
@@ -318,7 +318,8 @@ bool Gatherer::may_see_through_openings(int slot, const SceneChange& change) con
 }
 
 GatherRow Gatherer::gather_at_point(const Node& point, GatherSamples samples, std::uint32_t seed) const {
-  GatherRow row = surroundings_of_point(point, samples, seed);
+  const auto origin_of = [&](glm::vec2) { return Origin{point.position, point.normal}; };
+  GatherRow row = gather_hemisphere(origin_of, samples.hemisphere, seed, Elements::kAll);
   look_through_openings(point, samples, seed, row);
   return row;
 }

@@ -150,6 +150,29 @@ TEST(Frame, ComponentsAddUpAndAFurnaceIsEvenlyBright) {
   }
 }
 
+TEST(Engine, ASensorBeforeAWallReadsWhatTheWallSendsThere) {
+  // Patches as large as these do not tell one height from another.
+  SolveOptions options = small_options();
+  options.maximum_edge_m = 0.6f;
+  options.node_samples = {4096, 2048};
+  constexpr float kReflectance = 0.5f;
+  Engine engine(roof_light_room(kReflectance), test::tregenza(), options);
+  const auto light = engine.relight(test::uniform_sky(1000));
+  std::vector<glm::dvec3> before, on;
+  for (double z = 0.1; z < 1.4; z += 0.15) {
+    before.emplace_back(0.02, 2.1, z);
+    on.emplace_back(0, 2.1, z);
+  }
+  const GatherSamples samples{16384, 4096};
+  const auto sent =
+                 test::illuminance(engine, *light, before, std::vector<glm::vec3>(before.size(), {-1, 0, 0}), samples),
+             received = test::illuminance(engine, *light, on, std::vector<glm::vec3>(on.size(), {1, 0, 0}), samples);
+  for (std::size_t i = 0; i < sent.size(); ++i) {
+    const float expected = kReflectance * (received[i].sky.y + received[i].indirect.y);
+    EXPECT_NEAR(sent[i].indirect.y / expected, 1, 0.02f) << before[i].z;
+  }
+}
+
 TEST(Engine, PartitionCastsNoLightThroughItself) {
   // A sheet from floor to ceiling parts the room; the side without the roof light is dark.
   SceneGeometry scene = roof_light_room(0.5f);

@@ -82,7 +82,8 @@ class Gatherer {
   void look_through_openings(const Node& point, GatherSamples samples, std::uint32_t seed, GatherRow& row) const;
   void look_through_openings(int slot, GatherSamples samples, std::uint32_t seed, GatherRow& row) const;
 
-  /// Irradiance at a point [Cohen & Wallace 1993, eq. 2.54]: surroundings, and through openings.
+  /// Irradiance at a point [Cohen & Wallace 1993, eq. 2.54]: surroundings, and through openings. All elements reached
+  /// are in `near`, but those of clusters.
   GatherRow gather_at_point(const Node& point, GatherSamples samples, std::uint32_t seed) const;
 
  private:
@@ -94,13 +95,14 @@ class Gatherer {
   struct Origin {
     glm::vec3 position, normal;
   };
+  enum class Elements { kNone, kNear, kAll };  // which of those reached are told, besides their slots
   auto places_on(int slot_index) const;
   template <typename OriginOf>
-  GatherRow gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, bool tells_near) const;
+  GatherRow gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, Elements told) const;
   template <typename OriginOf>
   bool gather_again(const OriginOf& origin_of, const Node& middle, float radius, int count, std::uint32_t seed,
-                    bool tells_near, const Gatherer& before, const SceneChange& change, GatherRow& row) const;
-  void add_hits(std::span<const Ray> rays, bool tells_near, HemisphereTally& tally) const;
+                    Elements told, const Gatherer& before, const SceneChange& change, GatherRow& row) const;
+  void add_hits(std::span<const Ray> rays, Elements told, HemisphereTally& tally) const;
   float radius_of(int slot) const;
   bool may_see_through_openings(const Node& middle, float radius, const SceneChange& change) const;
   template <typename OriginOf>

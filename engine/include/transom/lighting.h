@@ -69,6 +69,7 @@ struct Sensors {
   GatherSamples samples;
   std::vector<Node> nodes;
   SparseRows sky, patches;  ///< weights of sky bins and of patches
+  SparseRows resolved;      ///< what nodes say of the patches, less the patches: of nodes, then of patches
 
   /// Whether these are the sensors that were asked for.
   bool are(const std::vector<glm::dvec3>& p, const std::vector<glm::vec3>& n, GatherSamples s) const {
