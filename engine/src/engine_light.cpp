@@ -210,9 +210,10 @@ Sensors Engine::sensors(const std::vector<glm::dvec3>& points, const std::vector
 std::vector<Irradiance> Engine::illuminance(const Lighting& lighting, const Sensors& sensors) const {
   std::vector<Irradiance> result(sensors.nodes.size());
   const FirstBounce first_bounce(*mesh_, *rays_, lighting.bright_elements);
+  const std::vector<Beam> beams = lighting.condition.beams_at_points();
   parallel_indices(result.size(), 1, [&](std::size_t i) {
     const Node& node = sensors.nodes[i];
-    result[i].direct = direct_light_->illuminance(lighting.condition.beams, node.position, node.normal);
+    result[i].direct = direct_light_->illuminance(beams, node.position, node.normal);
     result[i].sky = sky_light(lighting, sensors.sky, i);
     result[i].indirect = first_bounce.irradiance(node.position, node.normal, FirstBounce::Rays::kMany) +
                          sensors.patches.dot(i, lighting.patch_smooth_radiosity);
