@@ -413,6 +413,7 @@ NB_MODULE(_engine, m) {
             result["beams"] = plan.beams.beams;
             result["facing_openings"] = plan.beams.facing_openings;
             result["beam_patches"] = plan.beams.patches;
+            result["unshaded"] = plan.beams.is_unshaded;
             return result;
           },
           "How much of the last relighting its condition needed.")

@@ -280,7 +280,8 @@ class Engine:
 
     def plan(self) -> dict[str, int]:
         """What the present light took: channels (1 where scene and light are grey), beams that reach anything, opening
-        faces that face them, patches that their light might reach; 0 beams under an overcast sky."""
+        faces that face them, patches that their light might reach, and 1 for unshaded where the room is convex, so that
+        nothing can shade these; 0 beams under an overcast sky."""
         return {name: int(count) for name, count in self._core.plan.items()}
 
     def form_factors(self) -> tuple[NDArray[np.int64], NDArray[np.int32], Float32, Float32]:
