@@ -11,6 +11,7 @@ from transom.daylight.sun_disc import (
     AUTO_COUNTS,
     COUNTS,
     DISC_COUNT,
+    PLACES,
     SUN_RADIUS_RAD,
     TOLERANCE,
     SunPlan,
@@ -127,6 +128,26 @@ def test_point_error_of_a_plan_is_that_of_the_closed_form() -> None:
     plan = behind_blades(pitch)
     per_edge = 4 / (3 * math.pi) / pitch
     assert plan.point_error == pytest.approx(2 * per_edge / 0.5, rel=0.05)
+
+
+def test_no_more_than_so_many_places_are_asked() -> None:
+    most = 0
+
+    def shares(directions: np.ndarray, places: np.ndarray) -> np.ndarray:
+        nonlocal most
+        most = max(most, len(places))
+        assert places.max(initial=0) < 3 * PLACES
+        return np.ones((len(places), len(directions)), dtype=np.float32)
+
+    plan = plan_sun(SUNS[0], shares, np.ones(3 * PLACES - 1, dtype=np.float32))
+    assert plan == SunPlan() and most == PLACES
+
+
+def test_a_scene_without_places_has_a_point() -> None:
+    def shares(directions: np.ndarray, places: np.ndarray) -> np.ndarray:
+        return np.zeros((len(places), len(directions)), dtype=np.float32)
+
+    assert plan_sun(SUNS[0], shares, np.zeros(0, dtype=np.float32)) == SunPlan()
 
 
 def test_a_scene_without_sun_has_a_point() -> None:
