@@ -16,6 +16,7 @@ from transom.engine import Engine, Visibility
 from transom.engine_renderer import EngineRenderer
 from transom.engine_scene import engine_condition
 from transom.errors import InputError
+from transom.fenestration.reglazing import reglazed
 from transom.hard.changes import sunlit
 from transom.hard.claims import QUICK, Case, Lit
 from transom.hard.disc_cases import direct_share, disc_cases, penumbra_places, share_beyond
@@ -124,6 +125,21 @@ def test_indirect_light_of_a_point_is_that_of_the_disc() -> None:
         core.add_beam((x, y, z), (r, g, b))
     engine._core.relight(core)
     assert luminance(room.measure()["indirect"]) == pytest.approx(luminance(of_point), rel=3e-3)
+
+
+def test_products_receive_a_point() -> None:
+    """Behind a window that holds one, the picture is the same bit by bit, and not dark."""
+    room = Lit(
+        lambda: reglazed(windowed_room().load(), ["glass=laser_cut_panel"]),
+        lambda condition: sunlit(condition, LOW_SUN),
+        QUICK,
+    )
+    pictures = []
+    for count in (1, 19):
+        room.engine.relight(room.condition, count)
+        pictures.append(room.engine.render(from_window()).components["sun"])
+    assert pictures[0].max() > 0
+    assert np.array_equal(*pictures)
 
 
 def test_overcast_and_sunless_hours_have_no_sub_suns() -> None:
