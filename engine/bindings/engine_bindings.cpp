@@ -207,14 +207,14 @@ NB_MODULE(_engine, m) {
       .def(
           "__init__",
           [](Condition* self, In<float, nb::ndim<1>> sky_luminance, std::tuple<float, float, float> sky_colour,
-             std::tuple<float, float, float> ground_luminance, In<float, nb::shape<-1, -1, 3>> sky_picture) {
+             std::tuple<float, float, float> ground_luminance, In<float, nb::ndim<2>> sky_picture) {
             new (self) Condition{};
             self->sky_luminance = to_vector<float>(sky_luminance);
             const auto [sr, sg, sb] = sky_colour;
             self->sky_colour = {sr, sg, sb};
             const auto [gr, gg, gb] = ground_luminance;
             self->ground_luminance = {gr, gg, gb};
-            self->picture = to_vector<glm::vec3>(sky_picture);
+            self->picture = to_vector<float>(sky_picture);
             self->picture_height = static_cast<int>(sky_picture.shape(0));
             self->picture_width = static_cast<int>(sky_picture.shape(1));
           },

@@ -92,13 +92,25 @@ void BeamOutlines::covering(const BeamOutline& polygon, std::vector<int>& passag
     if (covers(k, polygon)) passages.push_back(k);
 }
 
-void BeamOutlines::mark_behind(int k, std::span<const float> x, std::span<const float> y, std::span<const float> z,
-                               std::span<int> is_behind) const {
+void BeamOutlines::along_beam(const Points& points, Points& seen) const {
+  seen.resize(points.size());
+  const auto coordinate = [&](glm::vec3 axis, std::vector<float>& result) {
+    const float *x = points.x.data(), *y = points.y.data(), *z = points.z.data();
+    float* to = result.data();
+    for (std::size_t i = 0; i < points.size(); ++i) to[i] = axis.x * x[i] + axis.y * y[i] + axis.z * z[i];
+  };
+  coordinate(across_, seen.x);
+  coordinate(along_, seen.y);
+  coordinate(towards_, seen.z);
+}
+
+void BeamOutlines::mark_behind(int k, const Points& seen, std::span<int> is_behind) const {
   const Passage& passage = passages_[static_cast<std::size_t>(k)];
   const auto [a, b, c, d] = passage.inwards;
   const glm::vec3 depth = passage.depth;
   const int lets_light_in = passage.is_edge_on ? 0 : 1;
-  for (std::size_t i = 0; i < x.size(); ++i) {
+  const float *x = seen.x.data(), *y = seen.y.data(), *z = seen.z.data();
+  for (std::size_t i = 0; i < is_behind.size(); ++i) {
     const auto along = [&](glm::vec3 line) { return line.x * x[i] + line.y * y[i] + line.z; };
     is_behind[i] = static_cast<int>(along(a) >= 0) & static_cast<int>(along(b) >= 0) & static_cast<int>(along(c) >= 0) &
                    static_cast<int>(along(d) >= 0) & static_cast<int>(along(depth) > z[i]) & lets_light_in;

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 namespace transom {
 namespace {
@@ -47,10 +48,111 @@ inline __m128 widened(const std::uint16_t* halves) {
 constexpr float kWidened = 5.192296858534828e33f;  // 2^112: what a widened half lacks
 #endif
 
-// Four whole numbers as floats.
-inline __m128 counted(const std::uint16_t* numbers) {
+// Weights as floats, one or four.
+inline float in_full(std::uint16_t weight) {
+  return static_cast<float>(static_cast<int>(weight));
+}
+inline float in_full(float weight) {
+  return weight;
+}
+inline __m128 four(const std::uint16_t* weights) {
   return _mm_cvtepi32_ps(
-      _mm_unpacklo_epi16(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(numbers)), _mm_setzero_si128()));
+      _mm_unpacklo_epi16(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(weights)), _mm_setzero_si128()));
+}
+inline __m128 four(const float* weights) {
+  return _mm_loadu_ps(weights);
+}
+
+// Four running sums of four channels each: entries k to k + 3 of a row go to one each. With registers of eight floats
+// two sums share one, and are the same. Value: two values for such a register, or one for half of it.
+class FourSums {
+ public:
+#ifdef __AVX2__
+  template <typename ValueOf>
+  void add(__m128 weight, std::size_t k, const ValueOf& value_of) {
+    const __m256 weights = _mm256_castps128_ps256(weight);
+    const auto weighted = [&](__m256i lanes, __m256 values) {
+      return _mm256_mul_ps(_mm256_permutevar8x32_ps(weights, lanes), values);
+    };
+    first_ = _mm256_add_ps(first_, weighted(_mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1), value_of.two(k)));
+    second_ = _mm256_add_ps(second_, weighted(_mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3), value_of.two(k + 2)));
+  }
+  __m128 operator[](int i) const {
+    const __m256 pair = i < 2 ? first_ : second_;
+    return i % 2 == 0 ? _mm256_castps256_ps128(pair) : _mm256_extractf128_ps(pair, 1);
+  }
+
+ private:
+  __m256 first_ = _mm256_setzero_ps(), second_ = _mm256_setzero_ps();
+#else
+  template <typename ValueOf>
+  void add(__m128 weight, std::size_t k, const ValueOf& value_of) {
+    sums_[0] = _mm_add_ps(sums_[0], _mm_mul_ps(_mm_shuffle_ps(weight, weight, 0x00), value_of.one(k)));
+    sums_[1] = _mm_add_ps(sums_[1], _mm_mul_ps(_mm_shuffle_ps(weight, weight, 0x55), value_of.one(k + 1)));
+    sums_[2] = _mm_add_ps(sums_[2], _mm_mul_ps(_mm_shuffle_ps(weight, weight, 0xaa), value_of.one(k + 2)));
+    sums_[3] = _mm_add_ps(sums_[3], _mm_mul_ps(_mm_shuffle_ps(weight, weight, 0xff), value_of.one(k + 3)));
+  }
+  __m128 operator[](int i) const {
+    return sums_[i];
+  }
+
+ private:
+  __m128 sums_[4] = {_mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps()};
+#endif
+};
+
+// The values of the entries of rows: halves, or single floats.
+template <typename Column>
+struct HalvesOf {
+  const Column* column;
+  const std::uint16_t* half;
+  const std::uint16_t* at(std::size_t k) const { return half + 4 * static_cast<std::size_t>(column[k]); }
+  __m128 one(std::size_t k) const { return widened(at(k)); }
+#ifdef __AVX2__
+  __m256 two(std::size_t k) const {
+    return _mm256_cvtph_ps(_mm_unpacklo_epi64(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(at(k))),
+                                              _mm_loadl_epi64(reinterpret_cast<const __m128i*>(at(k + 1)))));
+  }
+#endif
+};
+template <typename Column>
+struct FloatsOf {
+  const Column* column;
+  const glm::vec4* value;
+  __m128 one(std::size_t k) const { return _mm_loadu_ps(&value[column[k]].x); }
+#ifdef __AVX2__
+  __m256 two(std::size_t k) const {
+    return _mm256_insertf128_ps(_mm256_castps128_ps256(one(k)), one(k + 1), 1);
+  }
+#endif
+};
+
+template <typename Weight, typename ValueOf>
+glm::vec4 weighted_sum(const Weight* weights, std::size_t k, std::size_t end, const ValueOf& value_of) {
+  FourSums sums;
+  for (; k + 4 <= end; k += 4) sums.add(four(&weights[k]), k, value_of);
+  __m128 rest[4] = {sums[0], sums[1], sums[2], sums[3]};
+  for (std::size_t lane = 0; k < end; ++k, ++lane)
+    rest[lane] = _mm_add_ps(rest[lane], _mm_mul_ps(_mm_set1_ps(in_full(weights[k])), value_of.one(k)));
+  glm::vec4 sum;
+  _mm_storeu_ps(&sum.x, _mm_add_ps(_mm_add_ps(rest[0], rest[1]), _mm_add_ps(rest[2], rest[3])));
+  return sum;
+}
+
+// The same for one channel.
+template <typename Weight, typename ValueOf>
+float weighted_sum_grey(const Weight* weights, std::size_t k, std::size_t end, const ValueOf& value_of) {
+  float sums[4] = {0, 0, 0, 0};
+  for (; k + 4 <= end; k += 4)
+    for (std::size_t lane = 0; lane < 4; ++lane) sums[lane] += in_full(weights[k + lane]) * value_of(k + lane);
+  for (std::size_t lane = 0; k < end; ++k, ++lane) sums[lane] += in_full(weights[k]) * value_of(k);
+  return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+}
+
+// Calls body(columns) with the columns as they are stored.
+template <typename Body>
+auto with_columns(const CompactColumns& columns, const Body& body) {
+  return columns.are_short ? body(columns.short_column.data()) : body(columns.column.data());
 }
 
 }  // namespace
@@ -80,65 +182,61 @@ HalfColours::HalfColours(const std::vector<float>& greys) : half_(greys.size()),
   for (std::size_t i = 0; i < greys.size(); ++i) half_[i] = half_of(scale * greys[i], i);
 }
 
-CompactRows::CompactRows(const SparseRows& rows) : begin_(rows.begin) {
-  int last_column = 0;
-  for (const Share& share : rows.entries) last_column = std::max(last_column, share.index);
-  has_short_columns_ = last_column <= std::numeric_limits<std::uint16_t>::max();
+CompactColumns::CompactColumns(const SparseRows& rows) : begin(rows.begin) {
+  int last = 0;
+  for (const Share& share : rows.entries) last = std::max(last, share.index);
+  are_short = last <= std::numeric_limits<std::uint16_t>::max();
+  for (const Share& share : rows.entries)
+    if (are_short)
+      short_column.push_back(static_cast<std::uint16_t>(share.index));
+    else
+      column.push_back(static_cast<std::uint32_t>(share.index));
+}
+
+ExactRows::ExactRows(const SparseRows& rows) : columns_(rows) {
+  for (const Share& share : rows.entries) weight_.push_back(share.weight);
+}
+
+glm::vec4 ExactRows::dot(std::size_t row, const std::vector<glm::vec4>& values) const {
+  return with_columns(columns_, [&](const auto* column) {
+    return weighted_sum(weight_.data(), columns_.begin[row], columns_.begin[row + 1],
+                        FloatsOf<std::decay_t<decltype(*column)>>{column, values.data()});
+  });
+}
+
+float ExactRows::dot(std::size_t row, const std::vector<float>& values) const {
+  return with_columns(columns_, [&](const auto* column) {
+    return weighted_sum_grey(weight_.data(), columns_.begin[row], columns_.begin[row + 1],
+                             [&](std::size_t k) { return values[column[k]]; });
+  });
+}
+
+CompactRows::CompactRows(const SparseRows& rows) : columns_(rows) {
   for (std::size_t row = 0; row < rows.row_count(); ++row) {
     float most = 0;
-    for (std::size_t k = begin_[row]; k < begin_[row + 1]; ++k) most = std::max(most, rows.entries[k].weight);
-    unit_.push_back(most > 0 ? most / std::numeric_limits<std::uint16_t>::max() : 1.f);
-    for (std::size_t k = begin_[row]; k < begin_[row + 1]; ++k) {
-      const Share& share = rows.entries[k];
-      if (has_short_columns_)
-        short_column_.push_back(static_cast<std::uint16_t>(share.index));
-      else
-        column_.push_back(static_cast<std::uint32_t>(share.index));
-      weight_.push_back(static_cast<std::uint16_t>(std::lround(share.weight / unit_.back())));
+    for (std::size_t k = rows.begin[row]; k < rows.begin[row + 1]; ++k) most = std::max(most, rows.entries[k].weight);
+    const float step = most > 0 ? most / std::numeric_limits<std::uint16_t>::max() : 1.f;
+    double sum = 0, count = 0;
+    for (std::size_t k = rows.begin[row]; k < rows.begin[row + 1]; ++k) {
+      const float weight = rows.entries[k].weight;
+      weight_.push_back(static_cast<std::uint16_t>(std::lround(weight / step)));
+      sum += static_cast<double>(weight);
+      count += weight_.back();
     }
+    unit_.push_back(count > 0 ? static_cast<float>(sum / count) : step);
   }
 }
 
-template <typename Column>
-float CompactRows::grey(std::size_t row, const std::vector<Column>& column, const HalfColours& values) const {
-  float sums[4] = {0, 0, 0, 0};
-  const std::size_t end = begin_[row + 1];
-  const auto term = [&](std::size_t i) {
-    return static_cast<float>(static_cast<int>(weight_[i])) * widened(values.half_[column[i]]);
-  };
-  std::size_t k = begin_[row];
-  for (; k + 4 <= end; k += 4)
-    for (std::size_t lane = 0; lane < 4; ++lane) sums[lane] += term(k + lane);
-  for (std::size_t lane = 0; k < end; ++k, ++lane) sums[lane] += term(k);
-  return kWidened * ((sums[0] + sums[1]) + (sums[2] + sums[3]));
-}
-
-template <typename Column>
-glm::vec3 CompactRows::colour(std::size_t row, const std::vector<Column>& column, const HalfColours& values) const {
+glm::vec3 CompactRows::dot(std::size_t row, const HalfColours& values) const {
+  const std::size_t begin = columns_.begin[row], end = columns_.begin[row + 1];
   const std::uint16_t* half = values.half_.data();
-  __m128 sums[4] = {_mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps()};
-  const std::size_t end = begin_[row + 1];
-  const auto term = [&](std::size_t i, __m128 weight) {
-    return _mm_mul_ps(weight, widened(half + 4 * static_cast<std::size_t>(column[i])));
-  };
-  std::size_t k = begin_[row];
-  for (; k + 4 <= end; k += 4) {
-    const __m128 weight = counted(&weight_[k]);
-    sums[0] = _mm_add_ps(sums[0], term(k, _mm_shuffle_ps(weight, weight, 0x00)));
-    sums[1] = _mm_add_ps(sums[1], term(k + 1, _mm_shuffle_ps(weight, weight, 0x55)));
-    sums[2] = _mm_add_ps(sums[2], term(k + 2, _mm_shuffle_ps(weight, weight, 0xaa)));
-    sums[3] = _mm_add_ps(sums[3], term(k + 3, _mm_shuffle_ps(weight, weight, 0xff)));
-  }
-  for (std::size_t lane = 0; k < end; ++k, ++lane)
-    sums[lane] = _mm_add_ps(sums[lane], term(k, _mm_set1_ps(static_cast<float>(static_cast<int>(weight_[k])))));
-  alignas(16) float sum[4];
-  _mm_store_ps(sum, _mm_add_ps(_mm_add_ps(sums[0], sums[1]), _mm_add_ps(sums[2], sums[3])));
-  return kWidened * glm::vec3(sum[0], sum[1], sum[2]);
+  const glm::vec3 sum = with_columns(columns_, [&](const auto* column) {
+    if (values.is_grey_)
+      return glm::vec3(
+          weighted_sum_grey(weight_.data(), begin, end, [&](std::size_t k) { return widened(half[column[k]]); }));
+    return glm::vec3(weighted_sum(weight_.data(), begin, end, HalvesOf<std::decay_t<decltype(*column)>>{column, half}));
+  });
+  return unit_[row] * values.unit_ * kWidened * sum;
 }
-
-template float CompactRows::grey(std::size_t, const std::vector<std::uint16_t>&, const HalfColours&) const;
-template float CompactRows::grey(std::size_t, const std::vector<std::uint32_t>&, const HalfColours&) const;
-template glm::vec3 CompactRows::colour(std::size_t, const std::vector<std::uint16_t>&, const HalfColours&) const;
-template glm::vec3 CompactRows::colour(std::size_t, const std::vector<std::uint32_t>&, const HalfColours&) const;
 
 }  // namespace transom

@@ -1,7 +1,7 @@
 // The light of openings smaller than an element, most of whose samples would miss them: it is sent from the openings.
 #include <cmath>
 
-#include "transom/deposit.h"
+#include "deposit_samples.h"
 #include "transom/sampling.h"
 
 namespace transom {
@@ -13,8 +13,7 @@ constexpr float kGrazingCosine = 1e-3f;  // below it a small opening lets nothin
 }  // namespace
 
 // Takes the light away that comes to the points through a small opening first.
-void DirectLight::ignore_small_openings(glm::vec3 direction, std::span<const glm::vec3> points,
-                                        std::span<float> share) const {
+void DirectLight::ignore_small_openings(glm::vec3 direction, const Points& points, std::span<float> share) const {
   if (small_openings_.empty()) return;
   std::vector<Ray> rays;
   std::vector<std::size_t> index;

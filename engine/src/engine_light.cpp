@@ -15,21 +15,19 @@ constexpr int kShownCycle = 1;  // of interreflection: less than 1 % of the flux
 
 }  // namespace
 
+// Rows are sorted: sky bins come first.
 glm::vec3 Engine::sky_light(const Lighting& lighting, const SparseRows& rows, std::size_t row) const {
   const Condition& condition = lighting.condition;
   const int ground = sky_index_->count() - 1;
-  float sky = 0;
+  const std::size_t begin = rows.begin[row];
+  std::size_t end = rows.begin[row + 1];
   glm::vec3 sum(0);
-  for (std::size_t k = rows.begin[row]; k < rows.begin[row + 1]; ++k) {
-    const Share& share = rows.entries[k];
-    if (share.index == ground)
-      sum += share.weight * condition.ground_luminance;
-    else if (share.index < ground)
-      sky += share.weight * condition.sky_luminance[share.index];
-    else
-      sum += share.weight * lighting.panel_radiance[share.index - ground - 1];
+  for (; end > begin && rows.entries[end - 1].index >= ground; --end) {
+    const Share& share = rows.entries[end - 1];
+    sum += share.weight *
+           (share.index == ground ? condition.ground_luminance : lighting.panel_radiance[share.index - ground - 1]);
   }
-  return sum + sky * condition.sky_colour;
+  return sum + rows.dot_of(begin, end, condition.sky_luminance) * condition.sky_colour;
 }
 
 // What points are connected to for the light that falls on elements.
@@ -158,8 +156,7 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
   std::vector<glm::vec3> first_reflection = node_always_;
   {
     const TracePhase phase(trace_, "first reflection");
-    links_->add_irradiance({lighting->bright_elements.data(), lighting->beam_bright_count}, lighting->plan.is_grey,
-                           first_reflection);
+    links_->add_irradiance({lighting->bright_elements.data(), lighting->beam_bright_count}, first_reflection);
   }
   if (!is_wanted()) return nullptr;
   // A state on the way once most of the indirect light is there; later cycles change what an eye does not see.

@@ -17,7 +17,7 @@ constexpr std::size_t kGrain = 128;
 constexpr float kLikeness = 3e-4f;      // of what a patch receives: what a group may err by
 constexpr std::size_t kProbeStep = 37;  // patches, between those that are lit to measure how fast light converges
 constexpr double kSafety = 2;           // on what has been measured
-constexpr int kLeastInnerCycles = 3, kMostInnerCycles = 5;  // with the likeness
+constexpr int kLeastInnerCycles = 2, kMostInnerCycles = 5;  // with the likeness
 constexpr double kWantedShrinking = 0.04;  // by a cycle: more inner ones are taken where these do not do
 
 // Light of one channel, and of three.
@@ -62,7 +62,25 @@ Interreflection::Interreflection(const SparseRows& form_factors, const SparseRow
       groups_(places, areas_) {
   find_clusters(places);
   find_operators();
-  prepare({});
+  const SparseRows exchange = rows_of([&](std::size_t i) { return exchange_row(i); });
+  exchange_ = ExactRows(exchange);
+  likeness_ = CompactRows(exchange);
+}
+
+std::vector<Share> Interreflection::exchange_row(std::size_t patch) const {
+  std::vector<Share> row = form_factors_.row(patch);
+  const std::vector<Share> through = through_.row(patch);
+  row.insert(row.end(), through.begin(), through.end());
+  return row;
+}
+
+template <typename RowOf>
+SparseRows Interreflection::rows_of(const RowOf& row_of) const {
+  std::vector<std::vector<Share>> rows(areas_.size());
+  parallel_indices(rows.size(), kGrain, [&](std::size_t i) { rows[i] = row_of(i); });
+  SparseRows all;
+  for (const std::vector<Share>& row : rows) all.append(row);
+  return all;
 }
 
 // Patches in one cube of space that face about the same way. The cubes grow until the clusters are few enough.
@@ -119,25 +137,15 @@ void Interreflection::find_operators() {
 }
 
 void Interreflection::prepare(std::span<const std::vector<float>> smooth_lights) {
+  if (smooth_lights.empty()) return;
   std::vector<PatchGroups::TypicalLight> lights;
   for (const std::vector<float>& light : smooth_lights) lights.push_back(groups_.typical(light));
-  const std::size_t n = areas_.size();
-  std::vector<std::vector<Share>> rows(n);
-  parallel_indices(n, kGrain, [&](std::size_t i) {
-    rows[i] = form_factors_.row(i);
-    const std::vector<Share> through = through_.row(i);
-    rows[i].insert(rows[i].end(), through.begin(), through.end());
-    if (lights.empty()) return;
+  likeness_ = CompactRows(rows_of([&](std::size_t i) {
     std::vector<float> received;
     for (const PatchGroups::TypicalLight& light : lights)
       received.push_back(form_factors_.dot(i, light.radiosity) + through_.dot(i, light.radiosity));
-    rows[i] = groups_.grouped(rows[i], lights, received, kLikeness);
-  });
-  SparseRows all;
-  for (const std::vector<Share>& row : rows) all.append(row);
-  likeness_ = CompactRows(all);
-  foretold_shrinking_ = 1;
-  if (lights.empty()) return;
+    return groups_.grouped(exchange_row(i), lights, received, kLikeness);
+  }));
   double shrinking = 1;
   for (inner_cycles_ = kLeastInnerCycles;; ++inner_cycles_) {
     shrinking = measured_shrinking();
@@ -204,22 +212,23 @@ void Interreflection::begin(const PatchLight& light, std::vector<Value>& left, s
   for (std::size_t i = 0; i < n; ++i) left[i] += to(Value(), reflectance_[i]) * received[i];
 }
 
-// Adds to a radiosity what is left over, and all that its further reflections bring, by the likeness.
+// Adds to a radiosity what is left over, and all that its further reflections bring, by the likeness. The clusters
+// carry it first, then after each cycle what that has changed.
 template <typename Value>
 void Interreflection::carry_on(const std::vector<Value>& left, std::vector<Value>& radiosity) const {
   const std::size_t n = areas_.size(), m = static_cast<std::size_t>(cluster_count_);
-  std::vector<Value> sum = left, received(n), mean, mean_after, carried(m);
-  cluster_means(sum, mean);
-  for (int cycle = 0; cycle < inner_cycles_; ++cycle) {
+  std::vector<Value> sum = left, received(n), before(m, Value(0)), mean, carried(m);
+  for (int cycle = 0;; ++cycle) {
+    cluster_means(sum, mean);
+    for (std::size_t c = 0; c < m; ++c) before[c] = mean[c] - before[c];
+    apply_operator(before, carried);
+    for (std::size_t i = 0; i < n; ++i) sum[i] += to(Value(), reflectance_[i]) * carried[cluster_of_[i]];
+    if (cycle == inner_cycles_) break;
+    for (std::size_t c = 0; c < m; ++c) before[c] = mean[c] + to(Value(), cluster_reflectance_[c]) * carried[c];
     groups_.append_means(sum);
     const HalfColours sent(sum);
     parallel_indices(n, kGrain, [&](std::size_t i) { received[i] = to(Value(), likeness_.dot(i, sent)); });
     for (std::size_t i = 0; i < n; ++i) sum[i] = left[i] + to(Value(), reflectance_[i]) * received[i];
-    cluster_means(sum, mean_after);
-    for (std::size_t c = 0; c < m; ++c) mean[c] = mean_after[c] - mean[c];
-    apply_operator(mean, carried);
-    for (std::size_t i = 0; i < n; ++i) sum[i] += to(Value(), reflectance_[i]) * carried[cluster_of_[i]];
-    for (std::size_t c = 0; c < m; ++c) mean[c] = mean_after[c] + to(Value(), cluster_reflectance_[c]) * carried[c];
   }
   for (std::size_t i = 0; i < n; ++i) radiosity[i] += sum[i];
 }
@@ -242,7 +251,7 @@ double Interreflection::cycle(const PatchLight& light, std::vector<Value>& left,
   irradiance.resize(n);
   carry_on(left, radiosity);
   parallel_indices(n, kGrain, [&](std::size_t i) {
-    irradiance[i] = light.direct[i] + colour_of(form_factors_.dot(i, radiosity) + through_.dot(i, radiosity));
+    irradiance[i] = light.direct[i] + colour_of(exchange_.dot(i, radiosity));
     left[i] = to(Value(), light.emitted[i] + reflectance_[i] * irradiance[i]) - radiosity[i];
   });
   double rest = 0, total = 0;

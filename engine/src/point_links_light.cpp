@@ -1,6 +1,4 @@
 // The first reflection of beams towards linked points.
-#include <xmmintrin.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -13,108 +11,138 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr std::size_t kBlocksAtOnce = 8;
-constexpr float kEven = 1e-3f;  // relative difference of elements that count as evenly lit
+constexpr float kEven = 1e-3f;             // relative difference of elements that count as evenly lit
+constexpr float kSameHue = 1e-6f;          // of the strongest channel
+constexpr std::size_t kHuesCompared = 16;  // the last ones: patches of one face follow each other
 
-// Sum of weight x value: every fourth product goes to the same of four sums.
-inline glm::vec3 weighted_sum(const float* weight, const std::vector<glm::vec4>& value) {
-  __m128 sums[4] = {_mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps()};
-  const auto term = [&](std::size_t k) { return _mm_mul_ps(_mm_set1_ps(weight[k]), _mm_loadu_ps(&value[k].x)); };
+// Sum of weight x value: every eighth product goes to the same of eight sums.
+inline float weighted_sum(const float* weight, const float* value, std::size_t count) {
+  float sums[8] = {};
   std::size_t k = 0;
-  for (; k + 4 <= value.size(); k += 4)
-    for (std::size_t lane = 0; lane < 4; ++lane) sums[lane] = _mm_add_ps(sums[lane], term(k + lane));
-  for (std::size_t lane = 0; k < value.size(); ++k, ++lane) sums[lane] = _mm_add_ps(sums[lane], term(k));
-  alignas(16) float sum[4];
-  _mm_store_ps(sum, _mm_add_ps(_mm_add_ps(sums[0], sums[1]), _mm_add_ps(sums[2], sums[3])));
-  return {sum[0], sum[1], sum[2]};
+  for (; k + 8 <= count; k += 8)
+    for (std::size_t lane = 0; lane < 8; ++lane) sums[lane] += weight[k + lane] * value[k + lane];
+  for (std::size_t lane = 0; k < count; ++k, ++lane) sums[lane] += weight[k] * value[k];
+  return ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]));
+}
+
+float strongest_channel(glm::vec3 colour) {
+  return std::max({colour.x, colour.y, colour.z});
 }
 
 }  // namespace
 
 PointLinks::LitPatch PointLinks::lit_patch(std::shared_ptr<const Link> link, std::span<const BrightElement> bright,
                                            std::size_t first, std::size_t last) const {
-  const int per_slot = mesh_.elements_per_slot();
+  const auto per_slot = static_cast<std::size_t>(mesh_.elements_per_slot());
   LitPatch patch;
-  patch.normal = mesh_.normal_of(bright[first].element / per_slot);
-  patch.radiosity = bright[first].radiosity;
-  patch.sent.assign(static_cast<std::size_t>(per_slot), glm::vec4(0));
+  patch.normal = mesh_.normal_of(bright[first].element / mesh_.elements_per_slot());
+  std::vector<glm::vec3> sent(per_slot, glm::vec3(0));  // by element: radiosity
+  glm::vec3 flux(0);
   float sum = 0;
   for (std::size_t k = first; k < last; ++k) {
-    const int e = bright[k].element % per_slot;
+    const int e = bright[k].element % mesh_.elements_per_slot();
     const glm::vec4 element = link->element[e];
     const glm::vec3 radiosity = bright[k].radiosity;
     const float weight = element.w * (radiosity.x + radiosity.y + radiosity.z);
     patch.centroid += weight * glm::vec3(element);
-    patch.flux += element.w / kPi * radiosity;
+    flux += element.w / kPi * radiosity;
     sum += weight;
-    patch.sent[e] = glm::vec4(radiosity, 0);
+    sent[e] = radiosity;
   }
   if (sum > 0) patch.centroid /= sum;
-  for (std::size_t e = 0; e < link->element.size() && patch.is_even; ++e)
-    for (int channel = 0; channel < 3; ++channel)
-      patch.is_even &= link->element[e].w <= 0 ||
-                       std::abs(patch.sent[e][channel] - patch.radiosity[channel]) <= kEven * patch.radiosity[channel];
+  patch.flux = strongest_channel(flux);
+  if (patch.flux > 0) patch.hue = flux / patch.flux;
+  const auto is_alike = [&](std::size_t e, glm::vec3 radiosity, float tolerance) {
+    const glm::vec3 difference = glm::abs(sent[e] - radiosity);
+    return link->element[e].w <= 0 ||
+           (difference.x <= tolerance * radiosity.x && difference.y <= tolerance * radiosity.y &&
+            difference.z <= tolerance * radiosity.z);
+  };
+  bool is_of_one_hue = true;
+  for (std::size_t e = 0; e < per_slot; ++e) {
+    patch.is_even &= is_alike(e, bright[first].radiosity, kEven);
+    is_of_one_hue &= is_alike(e, strongest_channel(sent[e]) * patch.hue, kSameHue);
+  }
+  patch.radiosity = strongest_channel(bright[first].radiosity);
+  for (int channel = 0; channel < (is_of_one_hue ? 1 : 3); ++channel)
+    for (const glm::vec3& element : sent)
+      patch.sent.push_back(is_of_one_hue ? strongest_channel(element) : element[channel]);
   patch.link = std::move(link);
   return patch;
 }
 
-// What lit patches send to the points of a few blocks.
-template <bool kIsGrey>
-void PointLinks::add_blocks(const std::vector<LitPatch>& lit, std::size_t chunk,
-                            std::vector<glm::vec3>& irradiance) const {
-  const auto per_slot = static_cast<std::size_t>(mesh_.elements_per_slot());
-  const std::size_t block_count = x_.size() / kBlock;
-  const std::size_t first_block = chunk * kBlocksAtOnce,
-                    last_block = std::min(block_count, first_block + kBlocksAtOnce), base = first_block * kBlock;
-  float red[kBlocksAtOnce * kBlock] = {}, green[kBlocksAtOnce * kBlock] = {}, blue[kBlocksAtOnce * kBlock] = {};
+// Lit patches by hue: within one, a single channel is summed.
+std::vector<PointLinks::Hue> PointLinks::hues_of(const std::vector<LitPatch>& lit) {
+  std::vector<Hue> hues;
   for (const LitPatch& patch : lit) {
-    const Link& link = *patch.link;
-    const glm::vec3 c = patch.centroid, m = patch.normal, flux = patch.flux;
-    auto block = std::lower_bound(link.block.begin(), link.block.end(), static_cast<int>(first_block));
-    for (; block != link.block.end() && *block < static_cast<int>(last_block); ++block) {
-      const std::size_t from = static_cast<std::size_t>(*block) * kBlock, to = from - base,
-                        place = static_cast<std::size_t>(block - link.block.begin()) * kBlock;
-      if (patch.is_even) {
-        if (link.weight.empty()) break;
-        const std::uint16_t* known = &link.weight[place];
-        const glm::vec3 scale = link.weight_unit * patch.radiosity;
-        for (std::size_t k = 0; k < kBlock; ++k) {
-          const float weight = static_cast<float>(static_cast<int>(known[k]));
-          red[to + k] += weight * scale.x;
-          if constexpr (!kIsGrey) {
-            green[to + k] += weight * scale.y;
-            blue[to + k] += weight * scale.z;
-          }
-        }
-        continue;
-      }
-      const std::uint8_t* seen = &link.seen[place];
-      for (std::size_t k = 0; k < kBlock; ++k) {
-        const float weight = seen_share(seen[k]) * point_weight(c, m, from + k);
-        red[to + k] += weight * flux.x;
-        if constexpr (!kIsGrey) {
-          green[to + k] += weight * flux.y;
-          blue[to + k] += weight * flux.z;
-        }
-      }
-    }
-    auto near = std::lower_bound(link.near_point.begin(), link.near_point.end(), static_cast<int>(base));
-    for (; near != link.near_point.end() && *near < static_cast<int>(last_block * kBlock); ++near) {
-      const auto number = static_cast<std::size_t>(near - link.near_point.begin()),
-                 to = static_cast<std::size_t>(*near) - base;
-      const glm::vec3 received = patch.is_even ? link.near_sum[number] * patch.radiosity
-                                               : weighted_sum(&link.near_weight[number * per_slot], patch.sent);
-      red[to] += received.x;
-      green[to] += received.y;
-      blue[to] += received.z;
-    }
+    const auto is_same = [&](const Hue& hue) {
+      return strongest_channel(glm::abs(hue.colour - patch.hue)) <= kSameHue;
+    };
+    const std::size_t compared = std::min(hues.size(), kHuesCompared);
+    auto hue = std::find_if(hues.end() - static_cast<std::ptrdiff_t>(compared), hues.end(), is_same);
+    if (hue == hues.end()) hue = hues.insert(hues.end(), {patch.hue, {}});
+    hue->patches.push_back(&patch);
   }
-  const std::size_t count = std::min(point_count_, last_block * kBlock) - base;
-  for (std::size_t k = 0; k < count; ++k)
-    irradiance[base + k] += kIsGrey ? glm::vec3(red[k]) : glm::vec3(red[k], green[k], blue[k]);
+  return hues;
 }
 
-void PointLinks::add_irradiance(std::span<const BrightElement> bright, bool is_grey,
-                                std::vector<glm::vec3>& irradiance) const {
+// What lit patches of one hue send to the far points of some blocks: in its strongest channel, from the point `base`
+// on.
+void PointLinks::add_far(const Hue& hue, std::size_t first_block, std::size_t last_block, float* received) const {
+  const std::size_t base = first_block * kBlock;
+  for (const LitPatch* patch : hue.patches) {
+    const Link& link = *patch->link;
+    if (patch->is_even && link.weight.empty()) continue;
+    const glm::vec3 c = patch->centroid, m = patch->normal;
+    const float scale = link.weight_unit * patch->radiosity;
+    auto block = std::lower_bound(link.block.begin(), link.block.end(), static_cast<int>(first_block));
+    for (; block != link.block.end() && *block < static_cast<int>(last_block); ++block) {
+      const std::size_t from = static_cast<std::size_t>(*block) * kBlock,
+                        place = static_cast<std::size_t>(block - link.block.begin()) * kBlock;
+      float* to = received + (from - base);
+      if (patch->is_even) {
+        const std::uint16_t* known = &link.weight[place];
+        for (std::size_t k = 0; k < kBlock; ++k) to[k] += scale * static_cast<float>(static_cast<int>(known[k]));
+      } else {
+        const std::uint8_t* seen = &link.seen[place];
+        for (std::size_t k = 0; k < kBlock; ++k)
+          to[k] += patch->flux * seen_share(seen[k]) * point_weight(c, m, from + k);
+      }
+    }
+  }
+}
+
+// What lit patches send to the points of a few blocks.
+void PointLinks::add_blocks(const std::vector<LitPatch>& lit, const std::vector<Hue>& hues, std::size_t chunk,
+                            std::vector<glm::vec3>& irradiance) const {
+  const auto per_slot = static_cast<std::size_t>(mesh_.elements_per_slot());
+  const std::size_t first_block = chunk * kBlocksAtOnce,
+                    last_block = std::min(x_.size() / kBlock, first_block + kBlocksAtOnce), base = first_block * kBlock,
+                    count = std::min(point_count_, last_block * kBlock) - base;
+  for (const Hue& hue : hues) {
+    float received[kBlocksAtOnce * kBlock] = {};
+    add_far(hue, first_block, last_block, received);
+    for (std::size_t k = 0; k < count; ++k) irradiance[base + k] += received[k] * hue.colour;
+  }
+  for (const LitPatch& patch : lit) {
+    const Link& link = *patch.link;
+    auto near = std::lower_bound(link.near_point.begin(), link.near_point.end(), static_cast<int>(base));
+    for (; near != link.near_point.end() && *near < static_cast<int>(last_block * kBlock); ++near) {
+      const auto number = static_cast<std::size_t>(near - link.near_point.begin());
+      glm::vec3& received = irradiance[static_cast<std::size_t>(*near)];
+      const float* weight = &link.near_weight[number * per_slot];
+      if (patch.is_even)
+        received += link.near_sum[number] * patch.radiosity * patch.hue;
+      else if (patch.sent.size() == per_slot)
+        received += weighted_sum(weight, patch.sent.data(), per_slot) * patch.hue;
+      else
+        for (std::size_t channel = 0; channel < 3; ++channel)
+          received[static_cast<int>(channel)] += weighted_sum(weight, &patch.sent[channel * per_slot], per_slot);
+    }
+  }
+}
+
+void PointLinks::add_irradiance(std::span<const BrightElement> bright, std::vector<glm::vec3>& irradiance) const {
   const int per_slot = mesh_.elements_per_slot();
   std::vector<int> slots;
   for (const BrightElement& b : bright)
@@ -126,14 +154,9 @@ void PointLinks::add_irradiance(std::span<const BrightElement> bright, bool is_g
     if (k == bright.size() || bright[k].element / per_slot != bright[k - 1].element / per_slot) first.push_back(k);
   parallel_indices(slots.size(), 16,
                    [&](std::size_t k) { lit[k] = lit_patch(links[k], bright, first[k], first[k + 1]); });
-
+  const std::vector<Hue> hues = hues_of(lit);
   const std::size_t chunk_count = (x_.size() / kBlock + kBlocksAtOnce - 1) / kBlocksAtOnce;
-  parallel_indices(chunk_count, 1, [&](std::size_t chunk) {
-    if (is_grey)
-      add_blocks<true>(lit, chunk, irradiance);
-    else
-      add_blocks<false>(lit, chunk, irradiance);
-  });
+  parallel_indices(chunk_count, 1, [&](std::size_t chunk) { add_blocks(lit, hues, chunk, irradiance); });
 }
 
 }  // namespace transom

@@ -69,10 +69,11 @@ void Condition::validate(int sky_bin_count) const {
       throw InputError("the ground's luminance or the sky's colour is negative or not finite");
   if (picture.size() != static_cast<std::size_t>(picture_width) * static_cast<std::size_t>(picture_height))
     throw InputError("the picture of the sky does not have width x height texels");
-  for (const glm::vec3& texel : picture)
-    for (int c = 0; c < 3; ++c)
-      if (!(texel[c] >= 0 && std::isfinite(texel[c])))
-        throw InputError("the picture of the sky holds a value that is negative or not finite");
+  if (!picture.empty() && picture_height < 2)
+    throw InputError("the picture of the sky has no row besides that of the zenith");
+  for (const float texel : picture)
+    if (!(texel >= 0 && std::isfinite(texel)))
+      throw InputError("the picture of the sky holds a value that is negative or not finite");
 }
 
 std::vector<Beam> Condition::beams_at_points() const {
@@ -84,24 +85,20 @@ std::vector<Beam> Condition::beams_at_points() const {
 }
 
 glm::vec3 Condition::seen(glm::vec3 direction, const SkyBinIndex& bins) const {
-  if (picture.empty()) {
-    const int bin = bins(direction);
-    return bin == bins.count() - 1 ? ground_luminance : sky_luminance[bin] * sky_colour;
-  }
-  // Between rows on the same side of the horizon: sky and ground do not blend.
-  const float theta = std::acos(std::clamp(direction.z, -1.f, 1.f));
-  const float last_row = static_cast<float>(picture_height - 1);
-  float y = theta / std::numbers::pi_v<float> * last_row;
-  y = direction.z < 0 ? std::max(y, std::floor(last_row / 2) + 1) : std::min(y, std::floor(last_row / 2));
+  if (direction.z < 0) return ground_luminance;
+  if (picture.empty()) return sky_luminance[bins(direction)] * sky_colour;
+  const float theta = std::acos(std::min(direction.z, 1.f));
+  const float y = theta / (kTwoPi / 4) * static_cast<float>(picture_height - 1);
   const float x = azimuth_of(direction) / kTwoPi * static_cast<float>(picture_width) - 0.5f;
-  const int y0 = std::clamp(static_cast<int>(y), 0, picture_height - 2);
+  const int y0 = std::min(static_cast<int>(y), picture_height - 2);
   const int x0 = static_cast<int>(std::floor(x));
   const float fy = y - static_cast<float>(y0), fx = x - static_cast<float>(x0);
   const auto texel = [&](int column, int row) {
     return picture[row * picture_width + (column + picture_width) % picture_width];
   };
-  return (1 - fy) * ((1 - fx) * texel(x0, y0) + fx * texel(x0 + 1, y0)) +
-         fy * ((1 - fx) * texel(x0, y0 + 1) + fx * texel(x0 + 1, y0 + 1));
+  const float luminance = (1 - fy) * ((1 - fx) * texel(x0, y0) + fx * texel(x0 + 1, y0)) +
+                          fy * ((1 - fx) * texel(x0, y0 + 1) + fx * texel(x0 + 1, y0 + 1));
+  return luminance * sky_colour;
 }
 
 }  // namespace transom

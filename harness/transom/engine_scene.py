@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from transom import _engine
 from transom.daylight.condition import Condition
+from transom.daylight.environment import dome_image
 from transom.daylight.sky_bins import SkyBins
 from transom.daylight.sun_disc import sub_sun_illuminance, sub_suns
 from transom.fenestration.light import panel_light
@@ -19,8 +20,8 @@ from transom.glass import diffuse_reflectance, transmittance_table
 from transom.scene import content_key
 from transom.scene.model import Scene
 
-SKY_PICTURE_HEIGHT = 128
-"""Rows of the sky picture that is seen through openings."""
+SKY_PICTURE_HEIGHT = 64
+"""Rows, from zenith to horizon, of the picture of the sky that is seen through openings."""
 
 
 def engine_geometry(scene: Scene) -> _engine.SceneGeometry:
@@ -59,12 +60,11 @@ def engine_geometry(scene: Scene) -> _engine.SceneGeometry:
 def engine_condition(scene: Scene, condition: Condition, sky_bins: SkyBins, sub_sun_count: int) -> _engine.Condition:
     """Sky, ground and beams. Products receive a point sun whatever sub-suns stand for it elsewhere: their lobes are
     wider than its disc, or are made parallel on purpose."""
-    sky_picture = condition.environment_image(SKY_PICTURE_HEIGHT, single=True)
     core_condition = _engine.Condition(
         condition.bin_luminance(sky_bins, single=True).astype(np.float32, copy=False),
         _triple(condition.sky_rgb),
         _triple(condition.ground_luminance_rgb),
-        np.ascontiguousarray(sky_picture, dtype=np.float32),
+        dome_image(condition.sky, SKY_PICTURE_HEIGHT),
     )
     if condition.sun_direction is None:
         return core_condition

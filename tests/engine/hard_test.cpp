@@ -121,14 +121,16 @@ TEST(Condition, LightThatIsNoNumberIsRefused) {
   Engine engine(roof_light_room(0.5f), tregenza(), small_options());
   const float nan = std::numeric_limits<float>::quiet_NaN();
   Condition sky = uniform_sky(1000), colour = uniform_sky(1000), direction = uniform_sky(1000),
-            picture = uniform_sky(1000);
+            picture = uniform_sky(1000), flat_picture = uniform_sky(1000);
   sky.sky_luminance[7] = nan;
   colour.sky_colour.x = std::numeric_limits<float>::infinity();
   direction.beams.push_back({glm::vec3(nan), glm::vec3(1)});
-  picture.picture.assign(2, glm::vec3(nan));
-  picture.picture_width = 2;
-  picture.picture_height = 1;
-  for (const Condition& bad : {sky, colour, direction, picture}) EXPECT_THROW(engine.relight(bad), InputError);
+  picture.picture.assign(4, nan);
+  picture.picture_width = picture.picture_height = 2;
+  flat_picture.picture.assign(4, 1.f);
+  flat_picture.picture_width = 4;
+  flat_picture.picture_height = 1;
+  for (const Condition& bad : {sky, colour, direction, picture, flat_picture}) EXPECT_THROW(engine.relight(bad), InputError);
 }
 
 TEST(View, PlaceThatIsNoNumberIsRefused) {

@@ -120,6 +120,32 @@ TEST(CompactRows, FindWhatSparseRowsFindToTheirPrecision) {
   }
 }
 
+TEST(ExactRows, FindWhatSparseRowsFindBitByBit) {
+  for (const int columns : {7, 3000, 70000}) {
+    const RandomRows random(columns);
+    const ExactRows exact(random.rows);
+    std::vector<float> greys;
+    for (const glm::vec4& value : random.values) greys.push_back(value.y);
+    for (std::size_t r = 0; r < random.rows.row_count(); ++r) {
+      EXPECT_EQ(exact.dot(r, random.values), random.rows.dot(r, random.values)) << columns << " " << r;
+      EXPECT_EQ(exact.dot(r, greys), random.rows.dot(r, greys)) << columns << " " << r;
+    }
+  }
+}
+
+TEST(CompactRows, KeepTheSumOfARow) {
+  for (const int columns : {7, 3000}) {
+    const RandomRows random(columns);
+    const CompactRows compact(random.rows);
+    const HalfColours ones(std::vector<float>(random.values.size(), 1.f));
+    for (std::size_t r = 0; r < compact.row_count(); ++r) {
+      double sum = 0;
+      for (const Share& share : random.rows.row(r)) sum += static_cast<double>(share.weight);
+      EXPECT_NEAR(compact.dot(r, ones).x, sum, 1e-6 * sum) << columns << " " << r;
+    }
+  }
+}
+
 TEST(CompactRows, GreyIsEachOfThreeEqualChannels) {
   RandomRows random(500);
   std::vector<float> greys;

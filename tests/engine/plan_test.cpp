@@ -116,19 +116,17 @@ TEST(Plan, OutlinesKnowWhatLightHasPassedAsRaysDo) {
   const SobolSequence sequence(3);
   for (const glm::vec3 to_sun : {glm::vec3(0, 0, 1), glm::vec3(0.4f, 0.3f, 1), glm::vec3(-1, 0.2f, 0.3f)}) {
     const BeamOutlines outlines(faces, {0, 1, 2}, to_sun);
-    std::vector<glm::vec3> points;
-    std::vector<float> x, y, z, share(2000, 1.f);
+    BeamOutlines::Points points, seen;
+    std::vector<float> share(2000, 1.f);
+    points.resize(share.size());
     for (std::uint32_t i = 0; i < share.size(); ++i) {
       const glm::vec4 u = sequence.point4(i);
-      points.push_back(glm::vec3(7 * u.x, 4 * u.y, 4 * u.z) - glm::vec3(faces.origin));
-      const glm::vec3 place = outlines.along_beam(points.back());
-      x.push_back(place.x);
-      y.push_back(place.y);
-      z.push_back(place.z);
+      points.set(i, glm::vec3(7 * u.x, 4 * u.y, 4 * u.z) - glm::vec3(faces.origin));
     }
+    outlines.along_beam(points, seen);
     for (int k = 0; k < 3; ++k) {
       std::vector<int> is_behind(points.size());
-      outlines.mark_behind(k, x, y, z, is_behind);
+      outlines.mark_behind(k, seen, is_behind);
       for (std::size_t i = 0; i < points.size(); ++i) share[i] *= is_behind[i] ? 0.5f : 1.f;
     }
     for (std::size_t i = 0; i < points.size(); ++i)

@@ -43,7 +43,7 @@ struct LitFloor {
 
   std::vector<glm::vec3> by_links(PointLinks& links) const {
     std::vector<glm::vec3> irradiance(points.size(), glm::vec3(0));
-    links.add_irradiance(bright, false, irradiance);
+    links.add_irradiance(bright, irradiance);
     return irradiance;
   }
 };

@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from transom.daylight import Condition, resolve_condition
+from transom.daylight.environment import dome_image
 from transom.scene.model import ConditionSpec, Site
 
 Float64 = NDArray[np.float64]
@@ -81,6 +82,19 @@ def test_image_carries_the_colours_of_sky_and_ground() -> None:
         np.broadcast_to(condition.sky_rgb / condition.sky_rgb[1], (64, 3))
     )
     assert image[-1, 0] == pytest.approx(condition.ground_luminance_rgb)
+
+
+@pytest.mark.parametrize("sky", ["cie:1", "cie:12", "cie:15", "perez:850,70"])
+def test_dome_holds_the_skys_luminance_from_zenith_to_horizon(sky: str) -> None:
+    condition = resolve_condition(replace(DAY, sky=sky), SITE)
+    image = dome_image(condition.sky, 32)
+    assert image.shape == (32, 128)
+    assert image.dtype == np.float32
+    theta, phi = np.linspace(0, math.pi / 2, 32)[:, None], 2 * math.pi * (np.arange(128) + 0.5) / 128
+    z = np.maximum(np.cos(theta), 0) + 0 * phi
+    directions = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), z], axis=-1)
+    assert image.ravel() == pytest.approx(condition.sky.luminance(directions.reshape(-1, 3)), rel=1e-3)
+    assert image[-1].min() > 0
 
 
 @pytest.fixture

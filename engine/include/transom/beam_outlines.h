@@ -33,15 +33,28 @@ class BeamOutlines {
   /// Whether passage k may cover some of a polygon, in the same sense.
   bool covers(int k, const BeamOutline& polygon) const;
 
-  /// A point as seen along the beam: its place across it, and how far towards the source it is [m].
-  glm::vec3 along_beam(glm::vec3 point) const {
-    return {glm::dot(point, across_), glm::dot(point, along_), glm::dot(point, towards_)};
-  }
+  /// Points, coordinate by coordinate.
+  struct Points {
+    std::vector<float> x, y, z;
 
-  /// Which points (as along_beam has them: coordinates x, y and z, one after the other) lie behind passage k, a planar
-  /// one: light that arrives there along the beam has come through it. Exactly; is_behind: 1 or 0 for each.
-  void mark_behind(int k, std::span<const float> x, std::span<const float> y, std::span<const float> z,
-                   std::span<int> is_behind) const;
+    void resize(std::size_t count) {
+      for (std::vector<float>* list : {&x, &y, &z}) list->resize(count);
+    }
+    std::size_t size() const { return x.size(); }
+    glm::vec3 operator[](std::size_t i) const { return {x[i], y[i], z[i]}; }
+    void set(std::size_t i, glm::vec3 point) {
+      x[i] = point.x;
+      y[i] = point.y;
+      z[i] = point.z;
+    }
+  };
+
+  /// Points as seen along the beam: their place across it, and in z how far towards the source they are [m].
+  void along_beam(const Points& points, Points& seen) const;
+
+  /// Which points, as along_beam has them, lie behind passage k, a planar one: light that arrives there along the beam
+  /// has come through it. Exactly; is_behind: 1 or 0 for each.
+  void mark_behind(int k, const Points& seen, std::span<int> is_behind) const;
 
  private:
   struct Passage {

@@ -1,4 +1,4 @@
-/// @file Sparse rows in half the memory, for sums over many of them: memory is what these wait for.
+/// @file Sparse rows in less memory, for sums over many of them: memory is what these wait for.
 #pragma once
 
 #include <cstdint>
@@ -26,34 +26,46 @@ class HalfColours {
   float unit_ = 1;  // a power of two: what 1 of a half stands for
 };
 
-/// Compressed sparse rows of weights that are not negative, each off by up to 1/131070 of the largest of its row. With
-/// values of halves a sum of some hundred is off by a few 1e-5 of itself. Columns take two bytes each where these
-/// suffice.
+/// Where the entries of sparse rows are: columns take two bytes each where these suffice.
+struct CompactColumns {
+  CompactColumns() = default;
+  explicit CompactColumns(const SparseRows& rows);
+
+  std::vector<std::size_t> begin{0};  ///< rows + 1
+  bool are_short = true;
+  std::vector<std::uint16_t> short_column;  ///< else `column`
+  std::vector<std::uint32_t> column;
+};
+
+/// Compressed sparse rows of weights in full.
+class ExactRows {
+ public:
+  ExactRows() = default;
+  explicit ExactRows(const SparseRows& rows);
+
+  /// Sum over a row of weight x value; every fourth entry goes to the same of four sums.
+  glm::vec4 dot(std::size_t row, const std::vector<glm::vec4>& values) const;
+  float dot(std::size_t row, const std::vector<float>& values) const;
+
+ private:
+  CompactColumns columns_;
+  std::vector<float> weight_;
+};
+
+/// Compressed sparse rows of weights that are not negative, each off by up to 1/131070 of the largest of its row; the
+/// sum of a row is kept. With values of halves a sum of some hundred is off by a few 1e-5 of itself.
 class CompactRows {
  public:
   CompactRows() = default;
   explicit CompactRows(const SparseRows& rows);
 
-  std::size_t row_count() const { return begin_.size() - 1; }
+  std::size_t row_count() const { return columns_.begin.size() - 1; }
 
   /// Sum over a row of weight x value; every fourth entry goes to the same of four sums.
-  glm::vec3 dot(std::size_t row, const HalfColours& values) const {
-    const float unit = unit_[row] * values.unit_;
-    if (values.is_grey_)
-      return glm::vec3(unit * (has_short_columns_ ? grey(row, short_column_, values) : grey(row, column_, values)));
-    return unit * (has_short_columns_ ? colour(row, short_column_, values) : colour(row, column_, values));
-  }
+  glm::vec3 dot(std::size_t row, const HalfColours& values) const;
 
  private:
-  template <typename Column>
-  float grey(std::size_t row, const std::vector<Column>& column, const HalfColours& values) const;
-  template <typename Column>
-  glm::vec3 colour(std::size_t row, const std::vector<Column>& column, const HalfColours& values) const;
-
-  bool has_short_columns_ = true;
-  std::vector<std::size_t> begin_{0};
-  std::vector<std::uint16_t> short_column_;
-  std::vector<std::uint32_t> column_;
+  CompactColumns columns_;
   std::vector<std::uint16_t> weight_;
   std::vector<float> unit_;  // by row: what 1 of a weight stands for
 };

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "transom/beam_outlines.h"
 #include "transom/light_mesh.h"
 #include "transom/ray_scene.h"
 #include "transom/sky.h"
@@ -70,16 +71,19 @@ class DirectLight {
   };
   class Patterns;
   using Corners = std::array<glm::vec3, 4>;
-  std::vector<glm::vec3> points_on(int slot, const Corners& corners, std::span<const int> elements, int samples,
-                                   const Patterns& patterns) const;
+  using Points = BeamOutlines::Points;
+  Points points_on(int slot, const Corners& corners, std::span<const int> elements, std::size_t samples,
+                   const Patterns& patterns) const;
   struct SunlitSlot;
   class Sun;
   std::vector<SunlitSlot> reached(const Sun& sun, const Receivers& receivers) const;
-  void sun_transmission(const Sun& sun, const SunlitSlot& slot, std::span<const glm::vec3> points,
-                        std::span<float> share) const;
+  void sun_transmission(const Sun& sun, const SunlitSlot& slot, const Points& points, std::span<float> share) const;
   std::vector<float> sample_sun(const Sun& sun, const Receivers& receivers, const std::vector<SunlitSlot>& candidates,
                                 const Patterns& patterns) const;
-  std::vector<int> partly_lit(int slot, const std::vector<int>& place_of_slot, const std::vector<float>& share) const;
+  bool is_lit_as_all_around(int slot, const std::vector<int>& place_of_slot,
+                            const std::vector<float>& evenly_lit) const;
+  std::vector<int> partly_lit(int slot, const std::vector<int>& place_of_slot, const std::vector<float>& share,
+                              const std::vector<float>& evenly_lit) const;
   void add_sun(const Beam& sun, const Receivers& receivers, const Patterns& patterns,
                std::vector<std::vector<glm::vec3>>& sum, BeamPlan& plan) const;
   std::vector<std::size_t> reached_by_lobe(const Beam& lobe, const Receivers& receivers) const;
@@ -94,7 +98,7 @@ class DirectLight {
   void sources_and_beams_on_cluster(const std::vector<Beam>& beams, int slot, std::uint32_t seed,
                                     std::vector<glm::vec3>& sum) const;
 
-  void ignore_small_openings(glm::vec3 direction, std::span<const glm::vec3> points, std::span<float> share) const;
+  void ignore_small_openings(glm::vec3 direction, const Points& points, std::span<float> share) const;
   std::map<int, glm::vec3> send_through_small_openings(const std::vector<Beam>& beams, std::uint32_t seed) const;
 
   const LightMesh& mesh_;

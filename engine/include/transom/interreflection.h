@@ -56,6 +56,9 @@ class Interreflection {
 
  private:
   void find_clusters(const std::vector<PatchPlace>& places);
+  std::vector<Share> exchange_row(std::size_t patch) const;
+  template <typename RowOf>
+  SparseRows rows_of(const RowOf& row_of) const;
   void find_operators();
   template <typename Value>
   int solve_as(const PatchLight& light, double tolerance, int maximum_cycles, std::vector<glm::vec3>& irradiance,
@@ -81,7 +84,8 @@ class Interreflection {
   std::vector<glm::vec3> reflectance_;
   std::vector<float> areas_;
   PatchGroups groups_;
-  CompactRows likeness_;           // of F + K, over patches and groups
+  ExactRows exchange_;             // F + K
+  CompactRows likeness_;           // of it, over patches and groups
   int inner_cycles_ = 3;           // with the likeness, in each cycle
   double foretold_shrinking_ = 1;  // of what is left over, by a cycle after the first
   int cluster_count_ = 0;

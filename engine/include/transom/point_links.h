@@ -39,8 +39,8 @@ class PointLinks {
   void prepare(const std::vector<int>& slots, const Known& known) const;
 
   /// Adds to the irradiance of every point [lx] what the bright elements send to it; elements of one slot stand
-  /// together. Links what has not been linked. Threads may ask at once. is_grey: all light is; one channel is computed.
-  void add_irradiance(std::span<const BrightElement> bright, bool is_grey, std::vector<glm::vec3>& irradiance) const;
+  /// together. Links what has not been linked. Threads may ask at once. Patches of one hue cost one channel.
+  void add_irradiance(std::span<const BrightElement> bright, std::vector<glm::vec3>& irradiance) const;
 
   /// Memory held by links [bytes].
   std::size_t byte_count() const;
@@ -74,10 +74,15 @@ class PointLinks {
   struct LitPatch {
     std::shared_ptr<const Link> link;
     glm::vec3 centroid{0}, normal{0};  // of the light
-    glm::vec3 flux{0};                 // reflected [lm], over pi
+    glm::vec3 hue{1};                  // of the light: its strongest channel is 1. In that channel:
+    float flux = 0;                    // reflected [lm], over pi
     bool is_even = true;               // all elements send the same
-    glm::vec3 radiosity{0};            // of each of them then
-    std::vector<glm::vec4> sent;       // by element: radiosity
+    float radiosity = 0;               // of each of them then
+    std::vector<float> sent;           // by element: radiosity; where their hues differ, three channels one by one
+  };
+  struct Hue {
+    glm::vec3 colour;  // its strongest channel is 1
+    std::vector<const LitPatch*> patches;
   };
   std::size_t bytes_of(const Link& link) const;
   glm::vec3 exposed_middle(int slot) const;
@@ -86,8 +91,10 @@ class PointLinks {
   std::shared_ptr<const Link> link(int slot, const Known& known) const;
   void link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points, const KnownPoints& known) const;
   void link_near(Link& link, int slot, const KnownPoints& known) const;
-  template <bool kIsGrey>
-  void add_blocks(const std::vector<LitPatch>& lit, std::size_t chunk, std::vector<glm::vec3>& irradiance) const;
+  static std::vector<Hue> hues_of(const std::vector<LitPatch>& lit);
+  void add_far(const Hue& hue, std::size_t first_block, std::size_t last_block, float* received) const;
+  void add_blocks(const std::vector<LitPatch>& lit, const std::vector<Hue>& hues, std::size_t chunk,
+                  std::vector<glm::vec3>& irradiance) const;
   // Of what is stored of it.
   static float seen_share(std::uint8_t seen) {
     const float root = static_cast<float>(static_cast<int>(seen)) * (1.f / 255);

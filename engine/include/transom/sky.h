@@ -64,9 +64,9 @@ struct Condition {
   std::vector<float> sky_luminance;  ///< one a sky bin [cd/m²]
   glm::vec3 sky_colour{1};           ///< RGB with Y = 1
   glm::vec3 ground_luminance{0};     ///< [cd/m²]
-  /// What is seen of the sky and the ground: latitude-longitude picture, row 0 at the zenith, rows at pi j / (height -
-  /// 1), columns at 2 pi (i + 1/2) / width from +x towards +y. Empty: the bins are shown.
-  std::vector<glm::vec3> picture;
+  /// What is seen of the sky: luminance [cd/m²], row 0 at the zenith, row j at pi/2 j / (height - 1) from it, column i
+  /// at azimuth 2 pi (i + 1/2) / width from +x towards +y. Empty: the bins are shown.
+  std::vector<float> picture;
   int picture_width = 0, picture_height = 0;
 
   void validate(int sky_bin_count) const;

@@ -34,10 +34,13 @@ struct SparseRows {
   /// The same for single floats and for values of four: every fourth entry goes to the same of four sums, so that none
   /// waits for the last, and these are added at the end.
   float dot(std::size_t row, const std::vector<float>& values) const {
+    return dot_of(begin[row], begin[row + 1], values);
+  }
+  /// Sum over entries from one to before another.
+  float dot_of(std::size_t first, std::size_t end, const std::vector<float>& values) const {
     float sums[4] = {0, 0, 0, 0};
-    const std::size_t end = begin[row + 1];
     const auto term = [&](std::size_t i) { return entries[i].weight * values[entries[i].index]; };
-    std::size_t k = begin[row];
+    std::size_t k = first;
     for (; k + 4 <= end; k += 4)
       for (std::size_t lane = 0; lane < 4; ++lane) sums[lane] += term(k + lane);
     for (std::size_t lane = 0; k < end; ++k, ++lane) sums[lane] += term(k);

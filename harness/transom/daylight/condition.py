@@ -82,13 +82,13 @@ class Condition:
         mean: Floats = (luminance * weights).sum(axis=1)
         return mean
 
-    def environment_image(self, height: int, *, single: bool = False) -> Float32:
+    def environment_image(self, height: int) -> Float32:
         """Sky and ground as a latitude-longitude image (height, 2 height, 3) [cd/m²], without the sun.
 
         Row 0 is the zenith; row j lies at pi j / (height - 1) from it, column i at azimuth 2 pi (i + 1/2) / (2 height)
-        from +x (east) towards +y (north). single: calculated in single precision.
+        from +x (east) towards +y (north).
         """
-        return environment_image(self.sky, self.sky_rgb, self.ground_luminance_rgb, height, single=single)
+        return environment_image(self.sky, self.sky_rgb, self.ground_luminance_rgb, height)
 
 
 def resolve_condition(spec: ConditionSpec, site: Site) -> Condition:

@@ -68,8 +68,8 @@ class SkyBins:
         return self._single_quadrature if single else self._double_quadrature
 
     def _quadrature(self) -> tuple[Float64, Float64]:
-        """Gauss-Legendre in sin(altitude) and azimuth: 10 x 10 nodes in Tregenza's bins, 4 x 4 from m = 2 up."""
-        order = 10 if self.subdivision == 1 else 4
+        """Gauss-Legendre in sin(altitude) and azimuth: 10 x 10 nodes in Tregenza's bins, 4 x 4 at m = 2, else 3 x 3."""
+        order = 10 if self.subdivision == 1 else 4 if self.subdivision == 2 else 3
         node, weight = np.polynomial.legendre.leggauss(order)
         node, weight = (node + 1) / 2, weight / 2
         row = np.repeat(np.arange(len(self.row_counts)), self.row_counts)
