@@ -17,6 +17,7 @@
 #include "transom/frame.h"
 #include "transom/gl_context.h"
 #include "transom/relight_worker.h"
+#include "transom/sun_visibility.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -227,6 +228,13 @@ NB_MODULE(_engine, m) {
           },
           "direction_to_source"_a, "normal_illuminance"_a)
       .def(
+          "add_sub_sun",
+          [](Condition& c, std::tuple<float, float, float> direction, std::tuple<float, float, float> illuminance) {
+            c.sub_suns.push_back({vector_of(direction), vector_of(illuminance)});
+          },
+          "direction_to_source"_a, "normal_illuminance"_a,
+          "Part of the sun's disc, which stands for the sun where its light is shown or measured at points.")
+      .def(
           "add_lobe",
           [](Condition& c, int opening, std::tuple<float, float, float> direction,
              std::tuple<float, float, float> illuminance, std::tuple<float, float, float> sun) {
@@ -336,6 +344,27 @@ NB_MODULE(_engine, m) {
           },
           "points"_a, "normals"_a, "samples"_a, "Irradiance (N, 3, 3): rows direct, sky, indirect; columns RGB [lx].")
       .def(
+          "places_facing",
+          [](const Session& s, std::tuple<float, float, float> direction) {
+            Places places = places_facing(s.engine, vector_of(direction));
+            const std::size_t n = places.points.size();
+            return nb::make_tuple(to_array<float>(std::move(places.points), {n, 3}),
+                                  to_array<float>(std::move(places.weights), {n}));
+          },
+          "direction"_a, "Places on patches of rooms, for `shares_from`, and the flux that 1 lx brings to each [lm].")
+      .def(
+          "shares_from",
+          [](const Session& s, In<float, nb::shape<-1, 3>> points, In<float, nb::shape<-1, 3>> directions) {
+            const std::vector<glm::vec3> from = to_vector<glm::vec3>(points), to = to_vector<glm::vec3>(directions);
+            std::vector<float> shares;
+            {
+              const nb::gil_scoped_release release;
+              shares = shares_from(s.engine, from, to);
+            }
+            return to_array<float>(std::move(shares), {from.size(), to.size()});
+          },
+          "points"_a, "directions"_a, "Share of parallel light from each direction that arrives at each place.")
+      .def(
           "audit",
           [](const Session& s, int rays_per_opening) {
             const EnergyAudit a = s.engine.audit(*s.present, rays_per_opening);
@@ -384,6 +413,7 @@ NB_MODULE(_engine, m) {
             result["beams"] = plan.beams.beams;
             result["facing_openings"] = plan.beams.facing_openings;
             result["beam_patches"] = plan.beams.patches;
+            result["unshaded"] = plan.beams.is_unshaded;
             return result;
           },
           "How much of the last relighting its condition needed.")

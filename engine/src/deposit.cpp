@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "deposit_samples.h"
+#include "transom/convex_room.h"
 #include "transom/parallel.h"
 #include "transom/sampling.h"
 
@@ -36,7 +37,10 @@ DirectLight::Receivers DirectLight::receivers(const std::vector<int>& slots,
 
 DirectLight::DirectLight(const LightMesh& mesh, const RayScene& rays, const std::vector<PointSource>& sources,
                          const std::vector<Material>& materials, float small_opening_m2)
-    : mesh_(mesh), rays_(rays), is_small_opening_(mesh.faces().faces.size(), 0) {
+    : mesh_(mesh),
+      rays_(rays),
+      is_convex_(is_convex_room(mesh.faces())),
+      is_small_opening_(mesh.faces().faces.size(), 0) {
   for (std::size_t f = 0; f < is_small_opening_.size(); ++f) {
     const Face& face = mesh.faces().faces[f];
     if (materials[face.material].opening < 0) continue;

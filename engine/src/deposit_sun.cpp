@@ -104,8 +104,11 @@ void DirectLight::sun_transmission(const Sun& sun, const SunlitSlot& slot, const
     if (!is_crossed[i]) share[i] = 0;
     if (share[i] > 0) scratch.rays[ray_count++] = {points[i], sun.beam.direction_to_source};
   }
-  rays_.occluded(RayScene::What::kOpaque, {scratch.rays.data(), ray_count}, {scratch.blocked.data(), ray_count},
-                 RayScene::Order::kCoherent);
+  if (is_convex_ && slot.is_behind_openings)
+    std::fill_n(scratch.blocked.begin(), ray_count, std::uint8_t{0});
+  else
+    rays_.occluded(RayScene::What::kOpaque, {scratch.rays.data(), ray_count}, {scratch.blocked.data(), ray_count},
+                   RayScene::Order::kCoherent);
   for (std::size_t i = 0, next = 0; i < count; ++i)
     if (share[i] > 0 && scratch.blocked[next++]) share[i] = 0;
   ignore_small_openings(sun.beam.direction_to_source, points, share);
@@ -187,6 +190,7 @@ void DirectLight::add_sun(const Beam& sun, const Receivers& receivers, const Pat
   plan.patches += static_cast<int>(candidates.size());
   if (candidates.empty()) return;
   ++plan.beams;
+  plan.is_unshaded |= is_convex_;
   const std::vector<float> share = sample_sun(seen, receivers, candidates, patterns);
   std::vector<int> place_of_slot(static_cast<std::size_t>(mesh_.slot_count()), -1);
   for (std::size_t k = 0; k < candidates.size(); ++k)

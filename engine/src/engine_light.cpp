@@ -238,9 +238,10 @@ std::vector<Irradiance> Engine::illuminance(const Lighting& lighting, const Sens
   std::vector<Irradiance> result(sensors.nodes.size());
   const FirstBounce first_bounce(*mesh_, *rays_, lighting.bright_elements);
   const std::vector<glm::vec4> sent = sent_by_nodes_and_patches(lighting);
+  const std::vector<Beam> beams = lighting.condition.beams_at_points();
   parallel_indices(result.size(), 1, [&](std::size_t i) {
     const Node& node = sensors.nodes[i];
-    result[i].direct = direct_light_->illuminance(lighting.condition.beams, node.position, node.normal);
+    result[i].direct = direct_light_->illuminance(beams, node.position, node.normal);
     result[i].sky = sky_light(lighting, sensors.sky, i);
     result[i].indirect = first_bounce.irradiance(node.position, node.normal, FirstBounce::Rays::kMany) +
                          sensors.patches.dot(i, lighting.patch_smooth_radiosity) +

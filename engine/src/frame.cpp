@@ -269,7 +269,7 @@ Frame FrameRenderer::render(const View& view, const Lighting& lighting, FrameOpt
   {
     const TracePhase beam_phase(engine_.trace(), "beams of the picture");
     std::vector<float> mask_share;
-    for (const Beam& beam : condition.beams) {
+    for (const Beam& beam : condition.beams_at_points()) {
       if (beam.normal_illuminance == glm::vec3(0) || (beam.opening >= 0 && beam.shafts->empty())) continue;
       if (use_volumes) {
         const TracePhase volume_phase(engine_.trace(), "volumes");

@@ -50,13 +50,14 @@ void Condition::validate(int sky_bin_count) const {
                      std::to_string(sky_bin_count));
   for (const float l : sky_luminance)
     if (!(l >= 0 && std::isfinite(l))) throw InputError("the sky vector holds a value that is negative or not finite");
-  for (const Beam& beam : beams) {
-    if (!(std::abs(glm::length(beam.direction_to_source) - 1) <= 1e-3f))
-      throw InputError("the direction of a beam is not a unit vector");
-    for (int c = 0; c < 3; ++c)
-      if (!(beam.normal_illuminance[c] >= 0 && std::isfinite(beam.normal_illuminance[c])))
-        throw InputError("the illuminance of a beam is negative or not finite");
-  }
+  for (const std::vector<Beam>* list : {&beams, &sub_suns})
+    for (const Beam& beam : *list) {
+      if (!(std::abs(glm::length(beam.direction_to_source) - 1) <= 1e-3f))
+        throw InputError("the direction of a beam is not a unit vector");
+      for (int c = 0; c < 3; ++c)
+        if (!(beam.normal_illuminance[c] >= 0 && std::isfinite(beam.normal_illuminance[c])))
+          throw InputError("the illuminance of a beam is negative or not finite");
+    }
   for (const Residual& residual : residuals)
     for (const glm::vec3& radiance : residual.radiance)
       for (int c = 0; c < 3; ++c)
@@ -73,6 +74,14 @@ void Condition::validate(int sky_bin_count) const {
   for (const float texel : picture)
     if (!(texel >= 0 && std::isfinite(texel)))
       throw InputError("the picture of the sky holds a value that is negative or not finite");
+}
+
+std::vector<Beam> Condition::beams_at_points() const {
+  if (sub_suns.empty()) return beams;
+  std::vector<Beam> at_points = sub_suns;
+  for (const Beam& beam : beams)
+    if (beam.opening >= 0) at_points.push_back(beam);
+  return at_points;
 }
 
 glm::vec3 Condition::seen(glm::vec3 direction, const SkyBinIndex& bins) const {

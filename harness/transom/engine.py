@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from transom import _engine
 from transom.daylight.condition import Condition
-from transom.daylight.environment import dome_image
 from transom.daylight.sky_bins import SkyBins
-from transom.engine_scene import engine_geometry, fenestration_of, what_else_changed
+from transom.daylight.sun_disc import Sun, SunPlan, plan_sun
+from transom.engine_scene import engine_condition, engine_geometry, fenestration_of, what_else_changed
 from transom.errors import InputError
 from transom.fenestration.light import panel_light
 from transom.fenestration.panels import panel_groups
@@ -28,9 +28,6 @@ Method = Literal["gather", "classic"]
 
 SKY_SUBDIVISION = 4
 """Reinhart's MF: 2305 bins. Coarser bins blur the sun's surroundings in a clear sky."""
-
-SKY_PICTURE_HEIGHT = 64
-"""Rows, from zenith to horizon, of the picture of the sky that is seen through openings."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +99,7 @@ class Engine:
     sky_bins: SkyBins
     _core: _engine.Engine = field(repr=False)
     condition: Condition | None = None
+    present_sun: SunPlan = field(default_factory=SunPlan)
 
     @classmethod
     def solve(cls, scene: Scene, options: SolveOptions | None = None, *, trace: bool = False) -> Self:
@@ -132,15 +130,17 @@ class Engine:
         engine._set_products()
         return engine
 
-    def relight(self, condition: Condition) -> None:
+    def relight(self, condition: Condition, sun: Sun = 1) -> None:
         """Finds the light of a condition; the geometry is not looked at again.
 
-        Raises InputError for light that is negative or not finite; the engine then keeps the light that it had.
+        sun: sub-suns that stand for its disc in pictures and at sensors, 1 for a point, or "auto" for as many as the
+        scene asks for (`sun_plan`). Indirect light is that of a point. Raises InputError for light that is negative or
+        not finite, and for a number of sub-suns that there is not; the engine then keeps the light that it had.
         """
-        core_condition = self._core_condition(condition)
+        core_condition, plan = self._core_condition(condition, sun)
         with self._input_errors(condition):
             self._core.relight(core_condition)
-        self.condition = condition
+        self.condition, self.present_sun = condition, plan
 
     def replace_products(self, scene: Scene) -> None:
         """Takes the products of a scene that differs in nothing else (`reglazed`), without a new solve. Relight next.
@@ -189,25 +189,22 @@ class Engine:
         except _engine.EngineInputError as error:
             raise InputError(str(error), file=self.scene.file, field=f"conditions.{condition.name}") from None
 
-    def _core_condition(self, condition: Condition) -> _engine.Condition:
-        core_condition = _engine.Condition(
-            condition.bin_luminance(self.sky_bins, single=True).astype(np.float32, copy=False),
-            _triple(condition.sky_rgb),
-            _triple(condition.ground_luminance_rgb),
-            dome_image(condition.sky, SKY_PICTURE_HEIGHT),
+    def sun_plan(self, condition: Condition) -> SunPlan:
+        """How many sub-suns the scene asks for under a condition's sun: 1, a point, unless much of its light indoors is
+        in penumbras, as behind louvres."""
+        if condition.sun_direction is None:
+            return SunPlan()
+        x, y, z = condition.sun_direction.tolist()
+        points, weights = self._core.places_facing((x, y, z))
+        return plan_sun(
+            condition.sun_direction,
+            lambda directions, places: self._core.shares_from(points[places], directions.astype(np.float32)),
+            weights,
         )
-        if condition.sun_direction is not None:
-            sun = _triple(condition.sun_direction)
-            core_condition.add_beam(sun, _triple(condition.sun_illuminance_rgb))
-            for light in panel_light(self.scene, condition):
-                opening = len(self.scene.openings) + light.group
-                for beam in light.beams:
-                    core_condition.add_lobe(
-                        opening, _triple(-beam.direction), _triple(beam.normal_illuminance_rgb), sun
-                    )
-                residual = np.ascontiguousarray(light.residual_rgb, dtype=np.float32)
-                core_condition.add_residual(opening, residual, sun)
-        return core_condition
+
+    def _core_condition(self, condition: Condition, sun: Sun) -> tuple[_engine.Condition, SunPlan]:
+        plan = self.sun_plan(condition) if sun == "auto" else SunPlan(1 if condition.sun_direction is None else sun)
+        return engine_condition(self.scene, condition, self.sky_bins, plan.sub_suns), plan
 
     def render(
         self, view: View, visibility: Visibility = "rays", *, edge_samples: int = 4, components: bool = True
@@ -283,7 +280,8 @@ class Engine:
 
     def plan(self) -> dict[str, int]:
         """What the present light took: channels (1 where scene and light are grey), beams that reach anything, opening
-        faces that face them, patches that their light might reach; 0 beams under an overcast sky."""
+        faces that face them, patches that their light might reach, and 1 for unshaded where the room is convex, so that
+        nothing can shade these; 0 beams under an overcast sky."""
         return {name: int(count) for name, count in self._core.plan.items()}
 
     def form_factors(self) -> tuple[NDArray[np.int64], NDArray[np.int32], Float32, Float32]:
@@ -327,17 +325,17 @@ class Relighting:
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
-        self._begun: dict[int, Condition] = {}
+        self._begun: dict[int, tuple[Condition, SunPlan]] = {}
 
-    def begin(self, condition: Condition) -> None:
+    def begin(self, condition: Condition, sun: Sun = 1) -> None:
         """Asks for the light of a condition and returns at once; one that is still in work is abandoned.
 
-        Raises InputError for light that is negative or not finite; what is in work then goes on.
+        sun: as in `Engine.relight`. Raises InputError as that does; what is in work then goes on.
         """
-        core_condition = self._engine._core_condition(condition)
+        core_condition, plan = self._engine._core_condition(condition, sun)
         with self._engine._input_errors(condition):
             number = self._engine._core.submit(core_condition)
-        self._begun[number] = condition
+        self._begun[number] = condition, plan
 
     def take(self) -> bool:
         """Makes the newest state the engine's present light; whether it is the complete light of the newest condition.
@@ -352,8 +350,8 @@ class Relighting:
 
     def _taken(self, number: int, is_complete: bool) -> bool:
         if number in self._begun:
-            self._engine.condition = self._begun[number]
-            self._begun = {n: condition for n, condition in self._begun.items() if n >= number}
+            self._engine.condition, self._engine.present_sun = self._begun[number]
+            self._begun = {n: begun for n, begun in self._begun.items() if n >= number}
         return is_complete and number == max(self._begun, default=0)
 
 
@@ -390,11 +388,6 @@ def thread_limit(count: int) -> Iterator[None]:
 def build_description() -> str:
     """Compiler, flags and libraries of the compiled engine."""
     return str(_engine.build_description())
-
-
-def _triple(vector: Float64) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in vector)
-    return x, y, z
 
 
 def _core_bins(bins: SkyBins) -> _engine.SkyBins:

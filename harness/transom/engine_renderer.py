@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from transom.daylight.condition import Condition
+from transom.daylight.sun_disc import parse_sun
 from transom.engine import Engine, SolveOptions
 from transom.renderer import Float64, ImageResult, Progress, SensorResult
 from transom.scene import content_key
@@ -19,7 +20,11 @@ SOLVE_FIELDS = tuple(f.name for f in fields(SolveOptions))
 
 
 class EngineRenderer:
-    """Transom's own engine. `version` is raised when its answers may change."""
+    """Transom's own engine. `version` is raised when its answers may change.
+
+    Options beside those of a solve: visibility, "rays" or "volumes"; edge_samples a pixel and axis; sensor_rays and
+    sensor_opening_rays a sensor; sun, "point", "disc", "disc:N" or "auto" (`transom.daylight.sun_disc`).
+    """
 
     name = "engine"
     version = "3"
@@ -29,7 +34,14 @@ class EngineRenderer:
 
     def default_options(self) -> dict[str, Any]:
         options = {name: getattr(SolveOptions(), name) for name in SOLVE_FIELDS}
-        return {"visibility": "rays", "edge_samples": 4, "sensor_rays": 16384, "sensor_opening_rays": 8192, **options}
+        return {
+            "visibility": "rays",
+            "edge_samples": 4,
+            "sensor_rays": 16384,
+            "sensor_opening_rays": 8192,
+            "sun": "point",
+            **options,
+        }
 
     def render(
         self,
@@ -86,12 +98,12 @@ class EngineRenderer:
         engine, solve_s = self.engine(scene, SolveOptions(**{name: options[name] for name in SOLVE_FIELDS}))
         report(1, 3)
         begin = time.perf_counter()
-        engine.relight(condition)
+        engine.relight(condition, parse_sun(str(options["sun"])))
         relight_s = time.perf_counter() - begin
         report(2, 3)
         facts: dict[str, Any] = {
             **engine.facts(),
-            "plan": engine.plan(),
+            "plan": {**engine.plan(), **engine.present_sun.facts()},
             "beams": (condition.sun_direction is not None) + engine.lobe_count,
             "lobes": engine.lobe_count,
             "sweeps": engine.sweeps,

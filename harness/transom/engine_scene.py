@@ -1,18 +1,27 @@
-"""A scene as the engine's arrays, and what of it a solved engine can exchange."""
+"""A scene and a condition as the engine's arrays, and what of a scene a solved engine can exchange."""
 
 from __future__ import annotations
 
 import dataclasses
 
 import numpy as np
+from numpy.typing import NDArray
 
 from transom import _engine
+from transom.daylight.condition import Condition
+from transom.daylight.environment import dome_image
+from transom.daylight.sky_bins import SkyBins
+from transom.daylight.sun_disc import sub_sun_illuminance, sub_suns
+from transom.fenestration.light import panel_light
 from transom.fenestration.load import load_fenestration
 from transom.fenestration.panels import panel_groups
 from transom.fenestration.through import Fenestration
 from transom.glass import diffuse_reflectance, transmittance_table
 from transom.scene import content_key
 from transom.scene.model import Scene
+
+SKY_PICTURE_HEIGHT = 64
+"""Rows, from zenith to horizon, of the picture of the sky that is seen through openings."""
 
 
 def engine_geometry(scene: Scene) -> _engine.SceneGeometry:
@@ -46,6 +55,36 @@ def engine_geometry(scene: Scene) -> _engine.SceneGeometry:
     for source in scene.point_sources:
         geometry.add_point_source(source.position, source.intensity)
     return geometry
+
+
+def engine_condition(scene: Scene, condition: Condition, sky_bins: SkyBins, sub_sun_count: int) -> _engine.Condition:
+    """Sky, ground and beams. Products receive a point sun whatever sub-suns stand for it elsewhere: their lobes are
+    wider than its disc, or are made parallel on purpose."""
+    core_condition = _engine.Condition(
+        condition.bin_luminance(sky_bins, single=True).astype(np.float32, copy=False),
+        _triple(condition.sky_rgb),
+        _triple(condition.ground_luminance_rgb),
+        dome_image(condition.sky, SKY_PICTURE_HEIGHT),
+    )
+    if condition.sun_direction is None:
+        return core_condition
+    sun = _triple(condition.sun_direction)
+    core_condition.add_beam(sun, _triple(condition.sun_illuminance_rgb))
+    if sub_sun_count > 1:
+        illuminance = _triple(sub_sun_illuminance(condition.sun_illuminance_rgb, sub_sun_count))
+        for direction in sub_suns(condition.sun_direction, sub_sun_count):
+            core_condition.add_sub_sun(_triple(direction), illuminance)
+    for light in panel_light(scene, condition):
+        opening = len(scene.openings) + light.group
+        for beam in light.beams:
+            core_condition.add_lobe(opening, _triple(-beam.direction), _triple(beam.normal_illuminance_rgb), sun)
+        core_condition.add_residual(opening, np.ascontiguousarray(light.residual_rgb, dtype=np.float32), sun)
+    return core_condition
+
+
+def _triple(vector: NDArray[np.float64]) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in vector)
+    return x, y, z
 
 
 def fenestration_of(scene: Scene, opening: int) -> Fenestration:

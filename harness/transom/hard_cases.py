@@ -11,6 +11,7 @@ from transom.comparison import COMPARISON_FORMAT, Comparison, HardCase
 from transom.errors import InputError
 from transom.hard.camera_cases import camera_cases
 from transom.hard.claims import Case, Claim, Seen
+from transom.hard.disc_cases import disc_cases
 from transom.hard.limit_cases import limit_cases
 from transom.hard.rooms import without_folder
 from transom.hard.shape_cases import shape_cases
@@ -20,7 +21,7 @@ from transom.progress import CaseProgress
 from transom.suite import Suite
 
 GROUPS: dict[str, Callable[[], list[Case]]] = {
-    "sun": sun_cases,
+    "sun": lambda: [*sun_cases(), *disc_cases()],
     "shape": shape_cases,
     "camera": camera_cases,
     "limit": limit_cases,

@@ -20,7 +20,7 @@ from transom.workflow import ENGINE, VISIBILITIES
 STORED_REFERENCES = ("mitsuba",)
 """Suites judged against these have cases in the stores; those with known answers are computed when compared."""
 
-QUESTION_OPTIONS = ("visibility", "target_patch_count", "method", "seed", "sensor_rays")
+QUESTION_OPTIONS = ("visibility", "target_patch_count", "method", "seed", "sensor_rays", "sun")
 """Options that make another question of a case, and not an outdated answer to the same one."""
 
 INPUT_WORDS = {

@@ -18,15 +18,13 @@ from numpy.typing import ArrayLike, NDArray
 from transom.daylight.cie_sky import STANDARD_PARAMETERS, CieSky
 from transom.daylight.condition import Condition
 from transom.daylight.perez_sky import PerezSky
+from transom.daylight.sun_disc import SUN_DIAMETER_DEG
 from transom.errors import InputError
 
 Float64 = NDArray[np.float64]
 
 WHITE_EFFICACY_LM_W = 179.0
 """Radiance's fixed luminous efficacy of equal-energy white: luminance over radiance. [Ward 1994, WHTEFFICACY]"""
-
-SUN_DIAMETER_DEG = 0.533
-"""Mean apparent diameter of the sun."""
 
 POINT_SUN_DIAMETER_DEG = 0.01
 """A disc that is a point for every purpose, for the matched sun: its penumbra is 0.2 mm wide at 1 m."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from transom.colour import luminance
 from transom.daylight.condition import Condition
+from transom.daylight.sun_disc import SUN_RADIUS_RAD
 from transom.errors import InputError
 from transom.fenestration.light import room_reflectance
 from transom.glass import pane, transmittance_table
@@ -22,9 +23,6 @@ Int32 = NDArray[np.int32]
 
 SKY_ROWS = 512
 """Rows of the sky table from zenith to horizon; four times as many columns. Interpolation error below 1e-4."""
-
-SUN_RADIUS_RAD = float(np.radians(0.533 / 2))
-"""Mean apparent radius of the sun's disc, as Radiance has it."""
 
 TABLE_INTERVALS = 1024
 """Intervals of the glass table: entry i is the transmittance at cos(theta) = i / 1024."""

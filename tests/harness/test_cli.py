@@ -35,6 +35,8 @@ def test_help_of_every_command_has_an_example(command: str, capsys: pytest.Captu
         (["render", "test_room", "--size", "0x480", "-o", "a.png"], ["0x480"]),
         (["render", "test_room", "--time", "noon", "-o", "a.png"], ["noon"]),
         (["render", "test_room", "--sky", "cie:17", "-o", "a.png"], ["cie:17"]),
+        (["render", "test_room", "--sun", "disc:8", "-o", "a.png"], ["--sun", "disc:8", "auto"]),
+        (["sensors", "desk_office", "--sun", "square", "-o", "a.csv"], ["--sun", "square", "auto"]),
         (["render", "test_room", "--renderer", "pencil", "-o", "a.png"], ["pencil"]),
         (["render", "test_room"], ["-o"]),
         (["render"], ["SCENE"]),

@@ -84,7 +84,7 @@ def test_the_plan_says_what_a_condition_needed(engines: tuple[Engine, Engine]) -
     _, gather = engines
     specs = {spec.name: spec for spec in gather.scene.conditions}
     gather.relight(resolve_condition(specs["overcast"], gather.scene.site))
-    assert gather.plan() == {"channels": 3, "beams": 0, "facing_openings": 0, "beam_patches": 0}
+    assert gather.plan() == {"channels": 3, "beams": 0, "facing_openings": 0, "beam_patches": 0, "unshaded": 0}
     gather.relight(resolve_condition(specs["mar21_1000"], gather.scene.site))
     assert gather.plan()["beams"] == 1
     assert 0 < gather.plan()["beam_patches"] < gather.facts()["patches"] / 2

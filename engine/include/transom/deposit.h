@@ -24,6 +24,7 @@ struct LitElement {
 /// that their light might reach, summed over beams.
 struct BeamPlan {
   int beams = 0, facing_openings = 0, patches = 0;
+  bool is_unshaded = false;  ///< the room is convex: no ray has looked for what shades patches behind openings
 };
 
 /// Casts light from beams and point sources on patches and points. Openings on the way take their share.
@@ -102,6 +103,7 @@ class DirectLight {
 
   const LightMesh& mesh_;
   const RayScene& rays_;
+  bool is_convex_;  // nothing opaque stands between openings and what lies behind them
   std::vector<LocalSource> sources_;
   std::vector<int> openings_, small_openings_;  // faces
   std::vector<char> is_small_opening_;          // by face

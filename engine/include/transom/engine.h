@@ -144,6 +144,7 @@ class Engine {
   const SparseRows& form_factors() const { return *form_factors_; }
   const std::vector<float>& patch_areas() const { return patch_area_; }
   const std::vector<int>& patch_slots() const { return slot_of_patch_; }
+  bool is_interior(std::size_t patch) const { return is_interior_[patch] != 0; }
 
  private:
   /// What an engine of an earlier state of the scene found, as far as it is valid.

@@ -56,6 +56,10 @@ struct Residual {
 /// Everything outdoors that can change from hour to hour.
 struct Condition {
   std::vector<Beam> beams;
+  /// Parts of the sun's disc. They stand for the sun where its light is shown, or measured at points; elements of
+  /// patches, which are wider than penumbras, receive that of the point in the middle. Empty: the sun is a point
+  /// everywhere.
+  std::vector<Beam> sub_suns;
   std::vector<Residual> residuals;
   std::vector<float> sky_luminance;  ///< one a sky bin [cd/m²]
   glm::vec3 sky_colour{1};           ///< RGB with Y = 1
@@ -66,6 +70,8 @@ struct Condition {
   int picture_width = 0, picture_height = 0;
 
   void validate(int sky_bin_count) const;
+  /// Beams at points: sub-suns, where there are any, in place of the sun; lobes.
+  std::vector<Beam> beams_at_points() const;
   glm::vec3 seen(glm::vec3 direction, const SkyBinIndex& bins) const;
 };
 

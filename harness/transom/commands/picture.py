@@ -31,6 +31,15 @@ GlazingOption = Annotated[
     ),
 ]
 
+SunOption = Annotated[
+    str,
+    typer.Option(
+        metavar="FORM",
+        help="Engine: the sun as a point; as sub-suns over its disc of 0.533 degrees: disc (19), or disc:7, 19, 37 ..; "
+        "or auto: as few as penumbras indoors allow, a point behind plain windows, more behind louvres.",
+    ),
+]
+
 DEFAULT_PICTURE_NOISE_PERCENT = 5.0
 
 
@@ -49,15 +58,18 @@ def render(
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Pixels; the view's own size if omitted.")] = None,
     noise: NoiseOption = None,
     glazing: GlazingOption = None,
+    sun: SunOption = "point",
 ) -> None:
     """Render a picture: radiance in cd/m² (.exr), or toned on the view's fixed scale (.png).
 
     \b
     Example:  transom render desk_office --time 2026-06-21T12:00 --sky clear --size 640x480 -o office.exr
               transom render test_room --glazing south_upper=laser_cut_panel -o panel.png
+              transom render partition_office --sun auto -o louvres.png
     """
     from transom.bundle import make_case
     from transom.daylight.condition import resolve_condition
+    from transom.daylight.sun_disc import parse_sun
     from transom.fenestration.reglazing import load_glazed
     from transom.images import write_picture
     from transom.progress import single_progress
@@ -69,8 +81,10 @@ def render(
     chosen = chosen_view(loaded, view, size)
     resolved = resolve_condition(chosen_condition(loaded, condition, time, sky), loaded.site)
     worker = load_renderer(renderer.value)
-    options = {"visibility": visibility.value, "method": method.value} if renderer is RendererName.engine else {}
-    target = None if renderer is RendererName.engine else Target(noise or DEFAULT_PICTURE_NOISE_PERCENT)
+    parse_sun(sun, "--sun")
+    is_engine = renderer is RendererName.engine
+    options = {"visibility": visibility.value, "method": method.value, "sun": sun} if is_engine else {}
+    target = None if is_engine else Target(noise or DEFAULT_PICTURE_NOISE_PERCENT)
     case = make_case(loaded, resolved, worker, options, view=chosen)
     with single_progress(case.label) as bars:
         bundle = render_case(worker, Question(case, target), progress=bars.update)

@@ -8,7 +8,15 @@ from typing import Annotated
 import typer
 
 from transom.commands.choices import RendererName, checked_output, chosen_condition
-from transom.commands.picture import ConditionOption, GlazingOption, NoiseOption, SceneArgument, SkyOption, TimeOption
+from transom.commands.picture import (
+    ConditionOption,
+    GlazingOption,
+    NoiseOption,
+    SceneArgument,
+    SkyOption,
+    SunOption,
+    TimeOption,
+)
 from transom.errors import InputError
 
 
@@ -24,6 +32,7 @@ def sensors(
     renderer: Annotated[RendererName, typer.Option(help="Who measures.")] = RendererName.engine,
     noise: NoiseOption = None,
     glazing: GlazingOption = None,
+    sun: SunOption = "point",
 ) -> None:
     """Illuminance [lx] at points, with its standard error.
 
@@ -34,6 +43,7 @@ def sensors(
     """
     from transom.bundle import make_case
     from transom.daylight.condition import resolve_condition
+    from transom.daylight.sun_disc import parse_sun
     from transom.fenestration.reglazing import load_glazed
     from transom.progress import single_progress
     from transom.renderer import load_renderer
@@ -47,8 +57,10 @@ def sensors(
         raise InputError("has no sensors", file=loaded.file, remedy="Give --points FILE.csv")
     resolved = resolve_condition(chosen_condition(loaded, condition, time, sky), loaded.site)
     worker = load_renderer(renderer.value)
+    parse_sun(sun, "--sun")
+    options = {"sun": sun} if renderer is RendererName.engine else {}
     target = None if renderer is RendererName.engine else Target(noise or SENSOR_TARGET_PERCENT)
-    case = make_case(loaded, resolved, worker, {}, sensors=table)
+    case = make_case(loaded, resolved, worker, options, sensors=table)
     with single_progress(case.label) as bars:
         bundle = render_case(worker, Question(case, target), progress=bars.update)
     write_sensors(output, bundle.sensors())

@@ -14,6 +14,7 @@ from transom.colour import luminance
 from transom.comparison import compare_methods
 from transom.daylight import resolve_condition
 from transom.daylight.condition import Condition
+from transom.daylight.sun_disc import Sun
 from transom.engine import Engine, Frame, SolveOptions, Visibility, thread_limit
 from transom.errors import InputError
 from transom.hard import changes
@@ -70,17 +71,20 @@ class Case:
 
 
 class Lit:
-    """A room in a light, loaded and solved when it is first looked at. light: changes the condition of the file."""
+    """A room in a light, loaded and solved when it is first looked at. light: changes the condition of the file. sun:
+    its sub-suns."""
 
     def __init__(
         self,
         room: Room | Callable[[], Scene],
         light: Callable[[Condition], Condition] | None = None,
         options: SolveOptions = QUICK,
+        sun: Sun = 1,
     ) -> None:
         self._load = room.load if isinstance(room, Room) else room
         self._light = light or (lambda condition: condition)
         self.options = options
+        self.sun = sun
 
     @cached_property
     def scene(self) -> Scene:
@@ -93,7 +97,7 @@ class Lit:
     @cached_property
     def engine(self) -> Engine:
         engine = Engine.solve(self.scene, self.options)
-        engine.relight(self.condition)
+        engine.relight(self.condition, self.sun)
         return engine
 
     @cached_property
@@ -112,7 +116,7 @@ class Lit:
 
     def changed(self, change: changes.Change) -> Lit:
         """The same in a changed scene and condition."""
-        return Lit(lambda: change.scene(self.scene), lambda _: change.condition(self.condition), self.options)
+        return Lit(lambda: change.scene(self.scene), lambda _: change.condition(self.condition), self.options, self.sun)
 
 
 def room_claims(lit: Lit, *, invariant: bool = True) -> tuple[Claim, ...]:
@@ -178,7 +182,7 @@ def relit(lit: Lit) -> Claim:
             lit.picture().radiance,
         )  # of the engine's first light, unless this is tried twice
         lit.engine.relight(changes.sunlit(lit.condition, (0.3, -0.5, 0.8)))
-        lit.engine.relight(lit.condition)
+        lit.engine.relight(lit.condition, lit.sun)
         again = (lit.measure()["total"], lit.picture().radiance)
         differences = (again[0] - first[0], again[1] - first[1])
         largest = max(float(np.abs(difference).max()) for difference in differences)
@@ -192,7 +196,7 @@ def threads(lit: Lit) -> Claim:
         answers = []
         for count in (1, 3):
             with thread_limit(count):
-                fresh = Lit(lambda: lit.scene, lambda _: lit.condition, lit.options)
+                fresh = Lit(lambda: lit.scene, lambda _: lit.condition, lit.options, lit.sun)
                 answers.append((fresh.sensors["total"], fresh.picture().radiance))
         is_same = all(np.array_equal(one, other) for one, other in zip(*answers, strict=True))
         return Seen(is_same, "1 and 3 threads: " + ("the same" if is_same else "different"))

@@ -49,11 +49,12 @@ def wide_window_room() -> Room:
     return Room((*shell(), wall, pane), openings={"glass": 0.8})
 
 
-def roof_light_room() -> Room:
-    """The usual room with an unglazed hole in its ceiling."""
+def roof_light_room(hole_m: tuple[float, float] = (1.0, 3.0)) -> Room:
+    """The usual room with an unglazed hole in its ceiling. hole_m: its low and high x."""
     x, y, z = ROOM_M
+    low, high = hole_m
     outer = [(0.0, 0.0, z), (0.0, y, z), (x, y, z), (x, 0.0, z)]
-    inner = [(1.0, 1.5, z), (1.0, 3.5, z), (3.0, 3.5, z), (3.0, 1.5, z)]
+    inner = [(low, 1.5, z), (low, 3.5, z), (high, 3.5, z), (high, 1.5, z)]
     hole = Polygon(tuple(inner[::-1]), "hole", "roof_light")
     return Room((*shell(without=("z1",)), *frame(outer, inner), hole), openings={"hole": None})
 
