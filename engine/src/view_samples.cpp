@@ -1,6 +1,7 @@
 #include "transom/view_samples.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
@@ -14,6 +15,7 @@ namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr int kMaximumCrossings = 16;   // openings looked through, one behind another
 constexpr float kSameNormal = 0.9995f;  // cosine between normals of one smooth or flat surface
+constexpr std::size_t kGroupSize = 64;  // points of a group: few enough to lie close together, several packets of rays
 
 // A surface at the end of a ray from the camera, or a pane on the way.
 struct Seen {
@@ -175,6 +177,7 @@ class PixelParts {
 // What one row of the picture found, in the order of its pixels.
 struct RowOfPixels {
   std::vector<BeamPoint> fine, on_panes;
+  std::vector<BeamGroup> centre_groups, pane_groups;
   std::vector<ViewSamples::Part> parts;
   std::vector<int> places;
   std::vector<std::vector<Share>> smooth;
@@ -182,6 +185,26 @@ struct RowOfPixels {
   std::vector<ViewSamples::Outlook> outlooks;
   std::vector<ViewSamples::SeenPanel> panels;
 };
+
+// Points of one surface, from number `first` on.
+BeamGroup group_of(std::span<const BeamPoint> points, std::size_t first) {
+  BeamGroup group{points[0].surface, first, first + points.size(), points[0].position, points[0].position};
+  for (const BeamPoint& point : points) {
+    group.low = glm::min(group.low, point.position);
+    group.high = glm::max(group.high, point.position);
+  }
+  return group;
+}
+
+// Groups points that follow each other on one surface; the first of them has the number `first`.
+void add_groups(std::span<const BeamPoint> points, std::size_t first, std::vector<BeamGroup>& groups) {
+  for (std::size_t begin = 0, end = 0; begin < points.size(); begin = end) {
+    end = begin + 1;
+    if (points[begin].surface < 0) continue;
+    while (end < std::min(points.size(), begin + kGroupSize) && points[end].surface == points[begin].surface) ++end;
+    groups.push_back(group_of(points.subspan(begin, end - begin), first + begin));
+  }
+}
 
 // Adds a sample to its pixel; gives the point at which beams are tested.
 BeamPoint add_sample(const Engine& engine, const Seen& seen, float weight, int pixel, int sample,
@@ -192,7 +215,8 @@ BeamPoint add_sample(const Engine& engine, const Seen& seen, float weight, int p
     return point;
   }
   if (point.surface < 0) {
-    row.outlooks.push_back({pixel, weight * seen.through, seen.direction});
+    row.outlooks.push_back(
+        {pixel, weight * seen.through, seen.direction, Condition::place_in_pictures(seen.direction)});
     return point;
   }
   const NodeShares shares = engine.shown_at(seen.hit.face, seen.hit.side, seen.hit.st, point.position);
@@ -224,10 +248,19 @@ glm::vec2 scattered_place(int x, int y) {
   return sample_place(x % kPeriod * kPeriod + y % kPeriod, kPeriod);
 }
 
-glm::vec3 place_on_plane(const CameraRays& camera, glm::vec3 eye, glm::vec2 pixel, glm::vec3 of_plane,
-                         glm::vec3 normal) {
-  const glm::vec3 direction = camera.direction(pixel);
-  return eye + direction * (glm::dot(of_plane - eye, normal) / glm::dot(direction, normal));
+void places_on_plane(const CameraRays& camera, glm::vec3 eye, glm::vec2 corner, std::span<const glm::vec2> places,
+                     glm::vec3 of_plane, glm::vec3 normal, std::span<glm::vec3> met) {
+  constexpr std::size_t kChunk = 64;
+  std::array<float, kChunk> x, y, z;
+  const float distance = glm::dot(of_plane - eye, normal);
+  for (std::size_t begin = 0; begin < places.size(); begin += kChunk) {
+    const std::size_t size = std::min(kChunk, places.size() - begin);
+    camera.directions(corner, places.subspan(begin, size), x.data(), y.data(), z.data());
+    for (std::size_t i = 0; i < size; ++i) {
+      const glm::vec3 direction(x[i], y[i], z[i]);
+      met[begin + i] = eye + direction * (distance / glm::dot(direction, normal));
+    }
+  }
 }
 
 ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_per_axis)
@@ -298,9 +331,9 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
       if (!has_edge[p]) {
         centre[p] = add_sample(engine, seen[p], 1, pixel, BeamPoint::kCentre, row.smooth[x], row);
         if (s > 1 && centre[p].surface >= 0)
-          centre[p].position = place_on_plane(
-              camera_rays, eye, glm::vec2(x, y) + scattered_place(static_cast<int>(x), static_cast<int>(y)),
-              centre[p].position, engine.faces().faces[seen[p].hit.face].normal);
+          places_on_plane(camera_rays, eye, glm::vec2(x, y),
+                          std::array{scattered_place(static_cast<int>(x), static_cast<int>(y))}, centre[p].position,
+                          engine.faces().faces[seen[p].hit.face].normal, {&centre[p].position, 1});
         continue;
       }
       centre[p] = beam_point(engine, seen[p], 1, pixel, BeamPoint::kCentre);
@@ -314,7 +347,9 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
           if (point.surface >= 0) row.fine.push_back(point);
         }
         if (row.fine.size() == first_point) continue;
-        row.parts.push_back({first_point, row.fine.size(), row.places.size(), row.places.size() + part.places.size()});
+        const std::span<const BeamPoint> of_part(&row.fine[first_point], row.fine.size() - first_point);
+        row.parts.push_back(
+            {group_of(of_part, first_point), row.places.size(), row.places.size() + part.places.size()});
         row.places.insert(row.places.end(), part.places.begin(), part.places.end());
       }
       const float weight = 1 / static_cast<float>(s * s);
@@ -327,24 +362,50 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
         row.on_panes.push_back(
             add_sample(engine, pane.seen, 1, static_cast<int>(y * row_size + pane.ray), -1, row.smooth[pane.ray], row));
     for (std::vector<Share>& shares : row.smooth) merge_shares(shares);
+    add_groups({&centre[y * row_size], row_size}, y * row_size, row.centre_groups);
+    add_groups(row.on_panes, 0, row.pane_groups);
   });
   std::size_t share_count = 0;
   for (const RowOfPixels& row : rows)
     for (const std::vector<Share>& shares : row.smooth) share_count += shares.size();
   smooth.entries.reserve(share_count);
   smooth.begin.reserve(pixel_count + 1);
+  const auto append = [](const auto& from, auto& to) { to.insert(to.end(), from.begin(), from.end()); };
+  const auto begin_row = [&] {
+    row_starts.push_back(
+        {centre_groups.size(), pane_groups.size(), parts.size(), constant.size(), outlooks.size(), panels.size()});
+  };
   for (const RowOfPixels& row : rows) {
-    for (const Part& part : row.parts)
-      parts.push_back({part.first_point + fine.size(), part.last_point + fine.size(), part.first_place + places.size(),
-                       part.last_place + places.size()});
-    places.insert(places.end(), row.places.begin(), row.places.end());
-    fine.insert(fine.end(), row.fine.begin(), row.fine.end());
-    on_panes.insert(on_panes.end(), row.on_panes.begin(), row.on_panes.end());
-    constant.insert(constant.end(), row.constant.begin(), row.constant.end());
-    outlooks.insert(outlooks.end(), row.outlooks.begin(), row.outlooks.end());
-    panels.insert(panels.end(), row.panels.begin(), row.panels.end());
+    begin_row();
+    const auto moved = [](auto group, std::size_t by) {
+      group.first += by;
+      group.last += by;
+      return group;
+    };
+    for (Part part : row.parts) {
+      part.first_place += places.size();
+      part.last_place += places.size();
+      parts.push_back(moved(part, fine.size()));
+    }
+    for (const BeamGroup& group : row.pane_groups) pane_groups.push_back(moved(group, on_panes.size()));
+    append(row.centre_groups, centre_groups);
+    append(row.places, places);
+    append(row.fine, fine);
+    append(row.on_panes, on_panes);
+    append(row.constant, constant);
+    append(row.outlooks, outlooks);
+    append(row.panels, panels);
     for (const std::vector<Share>& shares : row.smooth) smooth.append(shares);
   }
+  begin_row();
+  std::vector<char> is_listed(2 * engine.faces().faces.size(), 0);
+  const auto list_surfaces = [&](const auto& groups) {
+    for (const BeamGroup& group : groups)
+      if (!std::exchange(is_listed[static_cast<std::size_t>(group.surface)], 1)) surfaces.push_back(group.surface);
+  };
+  list_surfaces(centre_groups);
+  list_surfaces(pane_groups);
+  list_surfaces(parts);
   edge_pixel_count = static_cast<int>(std::count(has_edge.begin(), has_edge.end(), 1));
 }
 

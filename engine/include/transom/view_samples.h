@@ -24,6 +24,13 @@ struct BeamPoint {
                        kNotInMasks = -2;  ///< kNotInMasks: surface that no square of the samples is full of
 };
 
+/// Points one after the other that lie on one side of a face, close together.
+struct BeamGroup {
+  int surface;              ///< face * 2 + side
+  std::size_t first, last;  ///< points
+  glm::vec3 low{0}, high{0};
+};
+
 constexpr int kFiner = 2;  ///< times as many samples an axis say how much of a pixel each surface covers
 
 /// Where in its pixel, from its upper left corner, a sample lies. Samples are a grid turned by atan(1 /
@@ -35,9 +42,9 @@ glm::vec2 sample_place(int sample, int samples_per_axis);
 /// light or shade of a third of a pixel between them.
 glm::vec2 scattered_place(int x, int y);
 
-/// Where the ray through a point of the picture meets the plane through another point.
-glm::vec3 place_on_plane(const CameraRays& camera, glm::vec3 eye, glm::vec2 pixel, glm::vec3 of_plane,
-                         glm::vec3 normal);
+/// Where the rays through places of a pixel, from its upper left corner, meet the plane through another point.
+void places_on_plane(const CameraRays& camera, glm::vec3 eye, glm::vec2 corner, std::span<const glm::vec2> places,
+                     glm::vec3 of_plane, glm::vec3 normal, std::span<glm::vec3> met);
 
 /// The samples of a picture. Pixels without an edge of a surface have one, at their centre. The others are parts, by
 /// what is seen: edge_samples^2 samples stand for them, and a grid that is kFiner times as fine an axis says how much
@@ -52,12 +59,24 @@ struct ViewSamples {
   std::vector<BeamPoint> fine;      ///< samples of pixels with an edge, part by part
   std::vector<BeamPoint> on_panes;  ///< room sides of openings in front of either
 
-  /// One surface in a pixel with an edge: ranges of its points in `fine`, and of `places`.
-  struct Part {
-    std::size_t first_point, last_point, first_place, last_place;
+  /// Points that beams may reach: of `centre` those along rows of the picture, of `on_panes` those that follow each
+  /// other.
+  std::vector<BeamGroup> centre_groups, pane_groups;
+
+  /// One surface in a pixel with an edge: its points in `fine`, and a range of `places`.
+  struct Part : BeamGroup {
+    std::size_t first_place, last_place;
   };
   std::vector<Part> parts;
   std::vector<int> places;  ///< of the finer grid: where a part is seen
+
+  std::vector<int> surfaces;  ///< all that groups and parts lie on, each once
+
+  /// Where what belongs to a row of the picture begins in the lists here, with one more entry than rows.
+  struct RowStart {
+    std::size_t centre_group, pane_group, part, constant, outlook, panel;
+  };
+  std::vector<RowStart> row_starts;
 
   SparseRows smooth;  ///< by pixel: shares of what Engine::shown_radiance lists
 
@@ -73,6 +92,7 @@ struct ViewSamples {
     int pixel;
     float weight;
     glm::vec3 direction;
+    glm::vec2 place;  ///< Condition::place_in_pictures
   };
   std::vector<Outlook> outlooks;
 

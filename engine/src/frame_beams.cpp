@@ -1,0 +1,160 @@
+// Beams at the points of a picture: polygons along the beam first, rays for what they leave open.
+#include "frame_beams.h"
+
+#include <algorithm>
+#include <array>
+#include <numbers>
+
+#include "transom/parallel.h"
+
+namespace transom {
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+constexpr std::size_t kChunk = 64;  // points at once
+
+// A box across the beam around points, as its outline.
+BeamOutline box_outline(glm::vec3 low, glm::vec3 high) {
+  BeamOutline box;
+  box.corner = {glm::vec2(low), glm::vec2(high.x, low.y), glm::vec2(high), glm::vec2(low.x, high.y)};
+  box.corner_count = 4;
+  box.low = glm::vec2(low);
+  box.high = glm::vec2(high);
+  box.nearest = low.z;
+  box.farthest = high.z;
+  return box;
+}
+
+}  // namespace
+
+void ShadowRays::trace(const RayScene& scene, RayScene::What what) {
+  blocked_.resize(rays_.size());
+  scene.occluded(what, rays_, blocked_, RayScene::Order::kCoherent);
+  for (std::size_t i = 0; i < rays_.size(); ++i)
+    if (blocked_[i]) *shares_[i] = 0;
+  rays_.clear();
+  shares_.clear();
+}
+
+SeenBeam::SeenBeam(const Engine& engine, const Beam& beam, std::span<const int> surfaces,
+                   const std::vector<char>& is_enclosed)
+    : engine_(&engine), beam_(&beam), is_enclosed_(&is_enclosed), may_light_(is_enclosed.size(), 0) {
+  const std::vector<Face>& faces = engine.faces().faces;
+  const bool is_sun = beam.opening < 0;
+  if (is_sun) {
+    std::vector<int> openings;
+    for (std::size_t f = 0; f < faces.size(); ++f)
+      if (engine.scene().materials[faces[f].material].opening >= 0) openings.push_back(static_cast<int>(f));
+    outlines_.emplace(engine.faces(), openings, beam.direction_to_source);
+    for (const int f : openings)
+      transmittance_.push_back(engine.rays().opening_transmittance(f, beam.direction_to_source));
+    passages_.resize(is_enclosed.size());
+  }
+  parallel_indices(surfaces.size(), 64, [&](std::size_t i) {
+    const auto surface = static_cast<std::size_t>(surfaces[i]);
+    const Face& face = faces[surface / 2];
+    if ((glm::dot(face.normal, beam.direction_to_source) > 0) != (surface % 2 == 0)) return;
+    if (is_sun) outlines_->covering(outlines_->outline({face.corner, face.is_quad ? 4u : 3u}), passages_[surface]);
+    may_light_[surface] = !is_sun || !is_enclosed[surface] || !passages_[surface].empty();
+  });
+}
+
+bool SeenBeam::may_light(const BeamGroup& group) const {
+  if (!may_light(group.surface)) return false;
+  if (beam_->opening >= 0)
+    return std::any_of(beam_->shafts->begin(), beam_->shafts->end(),
+                       [&](const LightShaft& shaft) { return shaft.may_meet(group.low, group.high); });
+  if (!(*is_enclosed_)[static_cast<std::size_t>(group.surface)]) return true;
+  glm::vec3 low(Ray::kInfinity), high(-Ray::kInfinity);
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::vec3 place =
+        outlines_->along_beam({corner & 1 ? group.low.x : group.high.x, corner & 2 ? group.low.y : group.high.y,
+                               corner & 4 ? group.low.z : group.high.z});
+    low = glm::min(low, place);
+    high = glm::max(high, place);
+  }
+  const BeamOutline box = box_outline(low, high);
+  const std::vector<int>& passages = passages_[static_cast<std::size_t>(group.surface)];
+  return std::any_of(passages.begin(), passages.end(), [&](int k) { return outlines_->covers(k, box); });
+}
+
+void SeenBeam::find_shares(int surface, std::span<const BeamPoint> points, std::span<float> shares,
+                           ShadowRays& rays) const {
+  if (!may_light(surface)) {
+    std::fill(shares.begin(), shares.end(), 0.f);
+    return;
+  }
+  for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
+    const std::size_t size = std::min(kChunk, points.size() - begin);
+    if (beam_->opening < 0)
+      find_shares_of_sun(surface, points.subspan(begin, size), shares.subspan(begin, size), rays);
+    else
+      find_shares_of_lobe(points.subspan(begin, size), shares.subspan(begin, size), rays);
+  }
+}
+
+void SeenBeam::trace(ShadowRays& rays) const {
+  rays.trace(engine_->rays(), beam_->opening < 0 ? RayScene::What::kOpaque : RayScene::What::kAll);
+}
+
+glm::vec3 SeenBeam::reflected(const BeamPoint& point, float share) const {
+  return share * point.weight * glm::dot(point.normal, beam_->direction_to_source) / kPi *
+         engine_->reflectance(point.surface / 2, point.surface % 2) * beam_->normal_illuminance;
+}
+
+void SeenBeam::find_shares_of_sun(int surface, std::span<const BeamPoint> points, std::span<float> shares,
+                                  ShadowRays& rays) const {
+  std::array<float, kChunk> x, y, z;
+  std::array<int, kChunk> is_behind, is_reached;
+  const std::size_t count = points.size();
+  glm::vec3 low(Ray::kInfinity), high(-Ray::kInfinity);
+  for (std::size_t i = 0; i < count; ++i) {
+    const glm::vec3 place = outlines_->along_beam(points[i].position);
+    x[i] = place.x;
+    y[i] = place.y;
+    z[i] = place.z;
+    low = glm::min(low, place);
+    high = glm::max(high, place);
+  }
+  const int is_open = (*is_enclosed_)[static_cast<std::size_t>(surface)] ? 0 : 1;
+  for (std::size_t i = 0; i < count; ++i) {
+    shares[i] = faces(points[i]) ? 1.f : 0.f;
+    is_reached[i] = is_open;
+  }
+  const BeamOutline box = box_outline(low, high);
+  for (const int k : passages_[static_cast<std::size_t>(surface)]) {
+    if (!outlines_->covers(k, box)) continue;
+    outlines_->mark_behind(k, {x.data(), count}, {y.data(), count}, {z.data(), count}, {is_behind.data(), count});
+    const float transmittance = transmittance_[static_cast<std::size_t>(k)];
+    for (std::size_t i = 0; i < count; ++i) {
+      shares[i] *= is_behind[i] ? transmittance : 1.f;
+      is_reached[i] |= is_behind[i];
+    }
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!is_reached[i]) shares[i] = 0;
+    if (shares[i] > 0) rays.add({points[i].position, beam_->direction_to_source}, &shares[i]);
+  }
+}
+
+void SeenBeam::find_shares_of_lobe(std::span<const BeamPoint> points, std::span<float> shares, ShadowRays& rays) const {
+  glm::vec3 low = points[0].position, high = low;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    shares[i] = 0;
+    low = glm::min(low, points[i].position);
+    high = glm::max(high, points[i].position);
+  }
+  for (const LightShaft& shaft : *beam_->shafts) {
+    if (!shaft.may_meet(low, high)) continue;
+    const float cosine = -glm::dot(glm::vec3(shaft.plane), beam_->direction_to_source);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (shares[i] > 0 || !faces(points[i]) || !shaft.holds(points[i].position)) continue;
+      shares[i] = shaft.share;
+      const float distance = glm::dot(shaft.plane, glm::vec4(points[i].position, 1)) / cosine;
+      rays.add({points[i].position, beam_->direction_to_source, 0, distance - engine_->faces().ray_offset() / cosine},
+               &shares[i]);
+    }
+  }
+}
+
+}  // namespace transom
