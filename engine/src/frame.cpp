@@ -1,5 +1,7 @@
 #include "transom/frame.h"
 
+#include <xmmintrin.h>
+
 #include <algorithm>
 
 #include "frame_drawing.h"
@@ -24,6 +26,22 @@ std::vector<char> enclosed_surfaces(const Engine& engine) {
     is_enclosed[surface] = takes_part && !is_open;
   });
   return is_enclosed;
+}
+
+// What the samples' shares are of: the light of the sky and, after each, that of surfaces; or their sums.
+std::vector<glm::vec4> shown_radiance(const Engine& engine, const Lighting& lighting, bool has_components) {
+  std::vector<glm::vec4> sky, indirect;
+  engine.shown_radiance(lighting, sky, indirect);
+  if (!has_components) {
+    for (std::size_t i = 0; i < sky.size(); ++i) sky[i] += indirect[i];
+    return sky;
+  }
+  std::vector<glm::vec4> both(2 * sky.size());
+  for (std::size_t i = 0; i < sky.size(); ++i) {
+    both[2 * i] = sky[i];
+    both[2 * i + 1] = indirect[i];
+  }
+  return both;
 }
 
 std::vector<glm::vec2> all_places(int samples_per_axis) {
@@ -91,23 +109,37 @@ void FrameRenderer::finish(const Drawing& drawing, int row) const {
     const ViewSamples::SeenPanel& p = samples.panels[k];
     exterior[p.pixel] += p.weight * drawing.lighting.panel_radiance[p.bin];
   }
+  if (!has_components) {
+    for (std::size_t p = first; p < first + width; ++p)
+      frame.radiance[p] += glm::vec3(glm::max(samples.smooth.dot(p, drawing.shown), glm::vec4(0)));
+    return;
+  }
   for (std::size_t p = first; p < first + width; ++p) {
-    glm::vec4 of_sky(0), of_surfaces(0);
+    // The sky's part and that of surfaces stand together, so that both come with one line of the cache.
+    __m128 of_sky = _mm_setzero_ps(), of_surfaces = _mm_setzero_ps();
     for (std::size_t k = samples.smooth.begin[p]; k < samples.smooth.begin[p + 1]; ++k) {
       const Share& share = samples.smooth.entries[k];
-      of_sky += share.weight * drawing.sky[share.index];
-      if (has_components) of_surfaces += share.weight * drawing.indirect[share.index];
+      const float* const shown = &drawing.shown[2 * static_cast<std::size_t>(share.index)].x;
+      const __m128 weight = _mm_set1_ps(share.weight);
+      of_sky = _mm_add_ps(of_sky, _mm_mul_ps(weight, _mm_loadu_ps(shown)));
+      of_surfaces = _mm_add_ps(of_surfaces, _mm_mul_ps(weight, _mm_loadu_ps(shown + 4)));
     }
-    const glm::vec4 sum = glm::max(of_sky + of_surfaces, glm::vec4(0));
-    if (!has_components) {
-      frame.radiance[p] += glm::vec3(sum);
-      continue;
-    }
-    of_sky = glm::clamp(of_sky, glm::vec4(0), sum);
-    frame.sky[p] = glm::vec3(of_sky);
-    frame.indirect[p] = glm::vec3(sum - of_sky);
-    frame.radiance[p] = frame.sun[p] + frame.sky[p] + frame.indirect[p] + frame.emitted[p] + frame.exterior[p];
+    const __m128 sum = _mm_max_ps(_mm_add_ps(of_sky, of_surfaces), _mm_setzero_ps());
+    of_sky = _mm_min_ps(_mm_max_ps(of_sky, _mm_setzero_ps()), sum);
+    glm::vec4 sky, indirect;
+    _mm_storeu_ps(&sky.x, of_sky);
+    _mm_storeu_ps(&indirect.x, _mm_sub_ps(sum, of_sky));
+    frame.sky[p] = glm::vec3(sky);
+    frame.indirect[p] = glm::vec3(indirect);
   }
+  // As one list of numbers, of which the compiler takes several at once.
+  const std::size_t count = 3 * width;
+  float* const radiance = &frame.radiance[first].x;
+  const float *const from_sun = &frame.sun[first].x, *const from_sky = &frame.sky[first].x,
+                     *const from_surfaces = &frame.indirect[first].x, *const from_emitters = &frame.emitted[first].x,
+                     *const from_outdoors = &frame.exterior[first].x;
+  for (std::size_t i = 0; i < count; ++i)
+    radiance[i] = from_sun[i] + from_sky[i] + from_surfaces[i] + from_emitters[i] + from_outdoors[i];
 }
 
 // Draws the beams of a drawing: first what arrives at the point of each pixel, then what neighbours tell about it.
@@ -156,9 +188,7 @@ Frame FrameRenderer::render(const View& view, const Lighting& lighting, FrameOpt
       part->resize(samples_->centre.size());
   Drawing drawing{lighting,           masks, CameraRays(view), glm::vec3(view.position - engine_.faces().origin),
                   options.components, frame};
-  engine_.shown_radiance(lighting, drawing.sky, drawing.indirect);
-  if (!options.components)
-    for (std::size_t i = 0; i < drawing.sky.size(); ++i) drawing.sky[i] += drawing.indirect[i];
+  drawing.shown = shown_radiance(engine_, lighting, options.components);
   is_edge_ = samples_->has_edge;
 
   std::vector<const Beam*> beams;

@@ -13,18 +13,6 @@ namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr std::size_t kChunk = 64;  // points at once
 
-// A box across the beam around points, as its outline.
-BeamOutline box_outline(glm::vec3 low, glm::vec3 high) {
-  BeamOutline box;
-  box.corner = {glm::vec2(low), glm::vec2(high.x, low.y), glm::vec2(high), glm::vec2(low.x, high.y)};
-  box.corner_count = 4;
-  box.low = glm::vec2(low);
-  box.high = glm::vec2(high);
-  box.nearest = low.z;
-  box.farthest = high.z;
-  return box;
-}
-
 }  // namespace
 
 void ShadowRays::trace(const RayScene& scene, RayScene::What what) {
@@ -38,7 +26,11 @@ void ShadowRays::trace(const RayScene& scene, RayScene::What what) {
 
 SeenBeam::SeenBeam(const Engine& engine, const Beam& beam, std::span<const int> surfaces,
                    const std::vector<char>& is_enclosed)
-    : engine_(&engine), beam_(&beam), is_enclosed_(&is_enclosed), may_light_(is_enclosed.size(), 0) {
+    : engine_(&engine),
+      beam_(&beam),
+      is_enclosed_(&is_enclosed),
+      may_light_(is_enclosed.size(), 0),
+      margin_(engine.faces().ray_offset()) {
   const std::vector<Face>& faces = engine.faces().faces;
   const bool is_sun = beam.opening < 0;
   if (is_sun) {
@@ -46,16 +38,23 @@ SeenBeam::SeenBeam(const Engine& engine, const Beam& beam, std::span<const int> 
     for (std::size_t f = 0; f < faces.size(); ++f)
       if (engine.scene().materials[faces[f].material].opening >= 0) openings.push_back(static_cast<int>(f));
     outlines_.emplace(engine.faces(), openings, beam.direction_to_source);
-    for (const int f : openings)
-      transmittance_.push_back(engine.rays().opening_transmittance(f, beam.direction_to_source));
-    passages_.resize(is_enclosed.size());
+    for (int axis = 0; axis < 3; ++axis) {
+      glm::vec3 unit(0);
+      unit[axis] = 1;
+      absolute_axes_[axis] = glm::abs(outlines_->along_beam(unit));
+    }
+    for (const int f : openings) {
+      passages_.push_back({outlines_->outline({faces[f].corner, faces[f].is_quad ? 4u : 3u}),
+                           engine.rays().opening_transmittance(f, beam.direction_to_source)});
+    }
+    over_.resize(is_enclosed.size());
   }
   parallel_indices(surfaces.size(), 64, [&](std::size_t i) {
     const auto surface = static_cast<std::size_t>(surfaces[i]);
     const Face& face = faces[surface / 2];
     if ((glm::dot(face.normal, beam.direction_to_source) > 0) != (surface % 2 == 0)) return;
-    if (is_sun) outlines_->covering(outlines_->outline({face.corner, face.is_quad ? 4u : 3u}), passages_[surface]);
-    may_light_[surface] = !is_sun || !is_enclosed[surface] || !passages_[surface].empty();
+    if (is_sun) outlines_->covering(outlines_->outline({face.corner, face.is_quad ? 4u : 3u}), over_[surface]);
+    may_light_[surface] = !is_sun || !is_enclosed[surface] || !over_[surface].empty();
   });
 }
 
@@ -65,17 +64,18 @@ bool SeenBeam::may_light(const BeamGroup& group) const {
     return std::any_of(beam_->shafts->begin(), beam_->shafts->end(),
                        [&](const LightShaft& shaft) { return shaft.may_meet(group.low, group.high); });
   if (!(*is_enclosed_)[static_cast<std::size_t>(group.surface)]) return true;
-  glm::vec3 low(Ray::kInfinity), high(-Ray::kInfinity);
-  for (int corner = 0; corner < 8; ++corner) {
-    const glm::vec3 place =
-        outlines_->along_beam({corner & 1 ? group.low.x : group.high.x, corner & 2 ? group.low.y : group.high.y,
-                               corner & 4 ? group.low.z : group.high.z});
-    low = glm::min(low, place);
-    high = glm::max(high, place);
-  }
-  const BeamOutline box = box_outline(low, high);
-  const std::vector<int>& passages = passages_[static_cast<std::size_t>(group.surface)];
-  return std::any_of(passages.begin(), passages.end(), [&](int k) { return outlines_->covers(k, box); });
+  const glm::vec3 middle = outlines_->along_beam(0.5f * (group.low + group.high)),
+                  half = absolute_axes_ * (0.5f * (group.high - group.low));
+  const std::vector<int>& passages = over_[static_cast<std::size_t>(group.surface)];
+  return std::any_of(passages.begin(), passages.end(),
+                     [&](int k) { return may_cover(k, middle - half, middle + half); });
+}
+
+// Whether an opening may cover something of a box across the beam.
+bool SeenBeam::may_cover(int passage, glm::vec3 low, glm::vec3 high) const {
+  const BeamOutline& of = passages_[static_cast<std::size_t>(passage)].outline;
+  return of.low.x <= high.x + margin_ && of.high.x >= low.x - margin_ && of.low.y <= high.y + margin_ &&
+         of.high.y >= low.y - margin_ && of.farthest >= low.z - margin_;
 }
 
 void SeenBeam::find_shares(int surface, std::span<const BeamPoint> points, std::span<float> shares,
@@ -107,25 +107,26 @@ void SeenBeam::find_shares_of_sun(int surface, std::span<const BeamPoint> points
   std::array<float, kChunk> x, y, z;
   std::array<int, kChunk> is_behind, is_reached;
   const std::size_t count = points.size();
-  glm::vec3 low(Ray::kInfinity), high(-Ray::kInfinity);
   for (std::size_t i = 0; i < count; ++i) {
     const glm::vec3 place = outlines_->along_beam(points[i].position);
     x[i] = place.x;
     y[i] = place.y;
     z[i] = place.z;
-    low = glm::min(low, place);
-    high = glm::max(high, place);
+  }
+  glm::vec3 low(Ray::kInfinity), high(-Ray::kInfinity);
+  for (std::size_t i = 0; i < count; ++i) {
+    low = {std::min(low.x, x[i]), std::min(low.y, y[i]), std::min(low.z, z[i])};
+    high = {std::max(high.x, x[i]), std::max(high.y, y[i]), std::max(high.z, z[i])};
   }
   const int is_open = (*is_enclosed_)[static_cast<std::size_t>(surface)] ? 0 : 1;
   for (std::size_t i = 0; i < count; ++i) {
     shares[i] = faces(points[i]) ? 1.f : 0.f;
     is_reached[i] = is_open;
   }
-  const BeamOutline box = box_outline(low, high);
-  for (const int k : passages_[static_cast<std::size_t>(surface)]) {
-    if (!outlines_->covers(k, box)) continue;
+  for (const int k : over_[static_cast<std::size_t>(surface)]) {
+    if (!may_cover(k, low, high)) continue;
     outlines_->mark_behind(k, {x.data(), count}, {y.data(), count}, {z.data(), count}, {is_behind.data(), count});
-    const float transmittance = transmittance_[static_cast<std::size_t>(k)];
+    const float transmittance = passages_[static_cast<std::size_t>(k)].transmittance;
     for (std::size_t i = 0; i < count; ++i) {
       shares[i] *= is_behind[i] ? transmittance : 1.f;
       is_reached[i] |= is_behind[i];

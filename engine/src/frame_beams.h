@@ -55,15 +55,22 @@ class SeenBeam {
  private:
   void find_shares_of_sun(int surface, std::span<const BeamPoint> points, std::span<float> shares,
                           ShadowRays& rays) const;
+  bool may_cover(int passage, glm::vec3 low, glm::vec3 high) const;
   void find_shares_of_lobe(std::span<const BeamPoint> points, std::span<float> shares, ShadowRays& rays) const;
 
   const Engine* engine_;
   const Beam* beam_;
   const std::vector<char>* is_enclosed_;
-  std::vector<char> may_light_;             // by surface
-  std::optional<BeamOutlines> outlines_;    // of openings before the sun
-  std::vector<float> transmittance_;        // by passage
-  std::vector<std::vector<int>> passages_;  // that may cover a surface
+  std::vector<char> may_light_;           // by surface
+  std::optional<BeamOutlines> outlines_;  // of openings before the sun
+  glm::mat3 absolute_axes_{0};            // how far along them a box reaches: sizes of their coordinates
+  float margin_;                          // of boxes, more than rounding [m]
+  struct Passage {
+    BeamOutline outline;
+    float transmittance;
+  };
+  std::vector<Passage> passages_;
+  std::vector<std::vector<int>> over_;  // by surface: passages that may cover it
 };
 
 }  // namespace transom

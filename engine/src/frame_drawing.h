@@ -20,7 +20,7 @@ struct FrameRenderer::Drawing {
   std::vector<SeenBeam> beams{};
   const std::vector<float>* mask_share = nullptr;  ///< by stencil volumes; null: by rays
   bool is_begun = false, is_complete = true;       ///< beams have been drawn before; none will be later
-  std::vector<glm::vec4> sky{}, indirect{};        ///< what the samples' shares are of
+  std::vector<glm::vec4> shown{};                  ///< what the samples' shares are of
 };
 
 /// Memory that is kept from row to row.
