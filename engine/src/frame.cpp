@@ -44,12 +44,6 @@ std::vector<glm::vec4> shown_radiance(const Engine& engine, const Lighting& ligh
   return both;
 }
 
-std::vector<glm::vec2> all_places(int samples_per_axis) {
-  std::vector<glm::vec2> places;
-  for (int k = 0; k < samples_per_axis * samples_per_axis; ++k) places.push_back(sample_place(k, samples_per_axis));
-  return places;
-}
-
 }  // namespace
 
 FrameRenderer::FrameRenderer(const Engine& engine) : engine_(engine), is_enclosed_(enclosed_surfaces(engine)) {}
@@ -83,8 +77,8 @@ PrimaryHits trace_primary(const SceneGeometry& scene, const View& view) {
 // All but beams, and the sum: light of sky and of surfaces, between nodes, and what is seen itself. Extrapolation
 // beyond the outermost nodes never makes light or a part of it negative.
 void FrameRenderer::finish(const Drawing& drawing, int row) const {
-  const ViewSamples& samples = *samples_;
-  const auto width = static_cast<std::size_t>(samples.view.width), first = static_cast<std::size_t>(row) * width;
+  const ViewSamples::Row& samples = samples_->rows[row];
+  const auto width = static_cast<std::size_t>(samples_->view.width), first = static_cast<std::size_t>(row) * width;
   Frame& frame = drawing.frame;
   const bool has_components = drawing.has_components;
   if (has_components)
@@ -94,30 +88,24 @@ void FrameRenderer::finish(const Drawing& drawing, int row) const {
   Picture &sun = has_components ? frame.sun : frame.radiance,
           &emitted = has_components ? frame.emitted : frame.radiance,
           &exterior = has_components ? frame.exterior : frame.radiance;
-  const ViewSamples::RowStart &begin = samples.row_starts[row], &end = samples.row_starts[row + 1];
-  for (std::size_t k = begin.constant; k < end.constant; ++k) {
-    const ViewSamples::Constant& c = samples.constant[k];
+  for (const ViewSamples::Constant& c : samples.constant) {
     sun[c.pixel] += c.lamps;
     emitted[c.pixel] += c.emitted;
     exterior[c.pixel] += c.emitted_outdoors;
   }
-  for (std::size_t k = begin.outlook; k < end.outlook; ++k) {
-    const ViewSamples::Outlook& o = samples.outlooks[k];
+  for (const ViewSamples::Outlook& o : samples.outlooks)
     exterior[o.pixel] += o.weight * drawing.lighting.condition.seen(o.direction, o.place, engine_.sky_index());
-  }
-  for (std::size_t k = begin.panel; k < end.panel; ++k) {
-    const ViewSamples::SeenPanel& p = samples.panels[k];
+  for (const ViewSamples::SeenPanel& p : samples.panels)
     exterior[p.pixel] += p.weight * drawing.lighting.panel_radiance[p.bin];
-  }
   if (!has_components) {
-    for (std::size_t p = first; p < first + width; ++p)
-      frame.radiance[p] += glm::vec3(glm::max(samples.smooth.dot(p, drawing.shown), glm::vec4(0)));
+    for (std::size_t x = 0; x < width; ++x)
+      frame.radiance[first + x] += glm::vec3(glm::max(samples.smooth.dot(x, drawing.shown), glm::vec4(0)));
     return;
   }
-  for (std::size_t p = first; p < first + width; ++p) {
+  for (std::size_t x = 0; x < width; ++x) {
     // The sky's part and that of surfaces stand together, so that both come with one line of the cache.
     __m128 of_sky = _mm_setzero_ps(), of_surfaces = _mm_setzero_ps();
-    for (std::size_t k = samples.smooth.begin[p]; k < samples.smooth.begin[p + 1]; ++k) {
+    for (std::size_t k = samples.smooth.begin[x]; k < samples.smooth.begin[x + 1]; ++k) {
       const Share& share = samples.smooth.entries[k];
       const float* const shown = &drawing.shown[2 * static_cast<std::size_t>(share.index)].x;
       const __m128 weight = _mm_set1_ps(share.weight);
@@ -129,8 +117,8 @@ void FrameRenderer::finish(const Drawing& drawing, int row) const {
     glm::vec4 sky, indirect;
     _mm_storeu_ps(&sky.x, of_sky);
     _mm_storeu_ps(&indirect.x, _mm_sub_ps(sum, of_sky));
-    frame.sky[p] = glm::vec3(sky);
-    frame.indirect[p] = glm::vec3(indirect);
+    frame.sky[first + x] = glm::vec3(sky);
+    frame.indirect[first + x] = glm::vec3(indirect);
   }
   // As one list of numbers, of which the compiler takes several at once.
   const std::size_t count = 3 * width;

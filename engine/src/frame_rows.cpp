@@ -33,8 +33,7 @@ void FrameRenderer::find_centre_shares(const Drawing& drawing, std::size_t beam,
   float* const shares = &centre_share_[beam][y * width];
   const SeenBeam& seen = drawing.beams[beam];
   bool is_reached = false;
-  for (std::size_t g = samples_->row_starts[y].centre_group; g < samples_->row_starts[y + 1].centre_group; ++g) {
-    const BeamGroup& group = samples_->centre_groups[g];
+  for (const BeamGroup& group : samples_->rows[y].centre_groups) {
     if (!seen.may_light(group)) continue;
     if (!std::exchange(is_reached, true)) std::fill(shares, shares + width, 0.f);
     const std::span<const BeamPoint> points(&samples_->centre[group.first], group.last - group.first);
@@ -87,8 +86,7 @@ void FrameRenderer::add_to_pixels(const Drawing& drawing, std::size_t beam, int 
     return false;
   };
   scratch.chosen.clear();
-  for (std::size_t g = samples.row_starts[row].centre_group; g < samples.row_starts[row + 1].centre_group; ++g) {
-    const BeamGroup& group = samples.centre_groups[g];
+  for (const BeamGroup& group : samples.rows[row].centre_groups) {
     if (!seen.may_light(group.surface)) continue;
     for (std::size_t p = group.first; p < group.last; ++p) {
       if (samples.has_edge[p]) continue;
@@ -134,18 +132,16 @@ void FrameRenderer::put_on_plane(const Drawing& drawing, BeamPoint point, std::s
 // Pixels with an edge of a surface: every sample for itself, unless a beam ends within what is seen of a surface. Then
 // all places at which that is seen are tested on its plane.
 void FrameRenderer::add_to_parts(const Drawing& drawing, std::size_t beam, int row, Scratch& scratch, glm::vec3* sun) {
-  const ViewSamples& samples = *samples_;
+  const ViewSamples::Row& samples = samples_->rows[row];
   const SeenBeam& seen = drawing.beams[beam];
-  const int width = samples.view.width, height = samples.view.height;
-  const std::size_t first_part = samples.row_starts[row].part, last_part = samples.row_starts[row + 1].part;
-  if (first_part == last_part) return;
-  const std::size_t first_point = samples.parts[first_part].first;
-  scratch.shares.assign(samples.parts[last_part - 1].last - first_point, 0.f);
+  const int width = samples_->view.width, height = samples_->view.height;
+  if (samples.parts.empty()) return;
+  scratch.shares.assign(samples.fine.size(), 0.f);
   const auto shares_of = [&](const ViewSamples::Part& part) {
-    return std::span<float>(&scratch.shares[part.first - first_point], part.last - part.first);
+    return std::span<float>(&scratch.shares[part.first], part.last - part.first);
   };
   scratch.chosen.clear();
-  for (std::size_t i = first_part; i < last_part; ++i) {
+  for (std::size_t i = 0; i < samples.parts.size(); ++i) {
     const ViewSamples::Part& part = samples.parts[i];
     if (!seen.may_light(part.surface)) continue;
     scratch.chosen.push_back(i);
@@ -172,7 +168,7 @@ void FrameRenderer::add_to_parts(const Drawing& drawing, std::size_t beam, int r
     const int x = first.pixel - row * width;
     for (int y = first_row; y <= last_row; ++y)
       for (int i = std::max(x - 1, 0); i <= std::min(x + 1, width - 1); ++i)
-        if (is_other(around[y - first_row][i]) && is_continued(first, samples.centre[y * width + i])) return true;
+        if (is_other(around[y - first_row][i]) && is_continued(first, samples_->centre[y * width + i])) return true;
     return false;
   };
   std::erase_if(scratch.chosen, [&](std::size_t i) {
@@ -217,10 +213,9 @@ void FrameRenderer::add_to_parts(const Drawing& drawing, std::size_t beam, int r
 
 void FrameRenderer::add_to_panes(const Drawing& drawing, std::size_t beam, int row, Scratch& scratch,
                                  glm::vec3* sun) const {
-  const ViewSamples& samples = *samples_;
+  const ViewSamples::Row& samples = samples_->rows[row];
   const SeenBeam& seen = drawing.beams[beam];
-  for (std::size_t g = samples.row_starts[row].pane_group; g < samples.row_starts[row + 1].pane_group; ++g) {
-    const BeamGroup& group = samples.pane_groups[g];
+  for (const BeamGroup& group : samples.pane_groups) {
     if (!seen.may_light(group)) continue;
     const std::span<const BeamPoint> points(&samples.on_panes[group.first], group.last - group.first);
     scratch.shares.resize(points.size());
@@ -228,7 +223,7 @@ void FrameRenderer::add_to_panes(const Drawing& drawing, std::size_t beam, int r
     seen.trace(scratch.rays);
     for (std::size_t k = 0; k < points.size(); ++k)
       if (scratch.shares[k] > 0)
-        sun[points[k].pixel - row * samples.view.width] += seen.reflected(points[k], scratch.shares[k]);
+        sun[points[k].pixel - row * samples_->view.width] += seen.reflected(points[k], scratch.shares[k]);
   }
 }
 

@@ -37,6 +37,7 @@ constexpr int kFiner = 2;  ///< times as many samples an axis say how much of a 
 /// samples_per_axis): each has a square of the upright grid, a column and a row of its own, so that an edge along an
 /// axis of the picture, as most edges of buildings are, is found to 1 / samples_per_axis^2 of the pixel.
 glm::vec2 sample_place(int sample, int samples_per_axis);
+std::vector<glm::vec2> all_places(int samples_per_axis);
 
 /// Where a pixel without an edge is tested for beams: one of nine places, so that any three pixels side by side find
 /// light or shade of a third of a pixel between them.
@@ -52,40 +53,16 @@ void places_on_plane(const CameraRays& camera, glm::vec3 eye, glm::vec2 corner, 
 struct ViewSamples {
   ViewSamples(const Engine& engine, const View& view, int edge_samples);
 
-  View view;
-  int edge_samples;
-  std::vector<char> has_edge;       ///< by pixel: an edge of a surface
-  std::vector<BeamPoint> centre;    ///< by pixel: the surface at its centre; where it has no edge, at `scattered_place`
-  std::vector<BeamPoint> fine;      ///< samples of pixels with an edge, part by part
-  std::vector<BeamPoint> on_panes;  ///< room sides of openings in front of either
-
-  /// Points that beams may reach: of `centre` those along rows of the picture, of `on_panes` those that follow each
-  /// other.
-  std::vector<BeamGroup> centre_groups, pane_groups;
-
   /// One surface in a pixel with an edge: its points in `fine`, and a range of `places`.
   struct Part : BeamGroup {
     std::size_t first_place, last_place;
   };
-  std::vector<Part> parts;
-  std::vector<int> places;  ///< of the finer grid: where a part is seen
-
-  std::vector<int> surfaces;  ///< all that groups and parts lie on, each once
-
-  /// Where what belongs to a row of the picture begins in the lists here, with one more entry than rows.
-  struct RowStart {
-    std::size_t centre_group, pane_group, part, constant, outlook, panel;
-  };
-  std::vector<RowStart> row_starts;
-
-  SparseRows smooth;  ///< by pixel: shares of what Engine::shown_radiance lists
 
   /// Light that no condition changes [cd/m²]: of point sources, and of emitters indoors and behind openings.
   struct Constant {
     int pixel;
     glm::vec3 lamps, emitted, emitted_outdoors;
   };
-  std::vector<Constant> constant;
 
   /// Directions in which the sky or the ground is seen.
   struct Outlook {
@@ -94,7 +71,6 @@ struct ViewSamples {
     glm::vec3 direction;
     glm::vec2 place;  ///< Condition::place_in_pictures
   };
-  std::vector<Outlook> outlooks;
 
   /// Exit bins of panels in which their light is seen.
   struct SeenPanel {
@@ -102,8 +78,27 @@ struct ViewSamples {
     float weight;
     int bin;
   };
-  std::vector<SeenPanel> panels;
-  int edge_pixel_count = 0;
+
+  /// What belongs to one row of the picture.
+  struct Row {
+    std::vector<BeamGroup> centre_groups;  ///< of `centre`: all that beams may reach
+    std::vector<BeamPoint> fine;           ///< samples of pixels with an edge, part by part
+    std::vector<Part> parts;
+    std::vector<int> places;          ///< of the finer grid: where a part is seen
+    std::vector<BeamPoint> on_panes;  ///< room sides of openings in front of either
+    std::vector<BeamGroup> pane_groups;
+    SparseRows smooth;  ///< by column: shares of what Engine::shown_radiance lists
+    std::vector<Constant> constant;
+    std::vector<Outlook> outlooks;
+    std::vector<SeenPanel> panels;
+  };
+
+  View view;
+  int edge_samples;
+  std::vector<char> has_edge;     ///< by pixel: an edge of a surface
+  std::vector<BeamPoint> centre;  ///< by pixel: the surface at its centre; where it has no edge, at `scattered_place`
+  std::vector<Row> rows;
+  std::vector<int> surfaces;  ///< all that groups and parts lie on, each once
 };
 
 }  // namespace transom
