@@ -166,7 +166,6 @@ Frame FrameRenderer::render(const View& view, const Lighting& lighting, FrameOpt
   const TracePhase phase(engine_.trace(), "frame");
   view.validate();
   see(view, std::max(1, options.edge_samples));
-  const Masks masks(view, samples_->edge_samples);
   Frame frame;
   frame.width = view.width;
   frame.height = view.height;
@@ -174,8 +173,8 @@ Frame FrameRenderer::render(const View& view, const Lighting& lighting, FrameOpt
   if (options.components)
     for (Picture* part : {&frame.sun, &frame.sky, &frame.indirect, &frame.emitted, &frame.exterior})
       part->resize(samples_->centre.size());
-  Drawing drawing{lighting,           masks, CameraRays(view), glm::vec3(view.position - engine_.faces().origin),
-                  options.components, frame};
+  Drawing drawing{lighting, CameraRays(view), glm::vec3(view.position - engine_.faces().origin), options.components,
+                  frame};
   drawing.shown = shown_radiance(engine_, lighting, options.components);
   is_edge_ = samples_->has_edge;
 
@@ -183,17 +182,18 @@ Frame FrameRenderer::render(const View& view, const Lighting& lighting, FrameOpt
   for (const Beam& beam : lighting.condition.beams)
     if (beam.normal_illuminance != glm::vec3(0) && (beam.opening < 0 || !beam.shafts->empty())) beams.push_back(&beam);
   if (options.visibility == Visibility::kVolumes) {
-    std::vector<float> mask_share;
-    drawing.mask_share = &mask_share;
     for (std::size_t b = 0; b < beams.size(); ++b) {
-      {
-        const TracePhase volume_phase(engine_.trace(), "volumes");
-        frame.pass_count += render_mask(*beams[b], view, masks, mask_share);
-      }
       drawing.beams.clear();
       drawing.beams.emplace_back(engine_, *beams[b], samples_->surfaces, is_enclosed_);
+      const Masks masks(view, samples_->edge_samples, lit_range(drawing.beams[0]));
+      {
+        const TracePhase volume_phase(engine_.trace(), "volumes");
+        frame.pass_count += render_mask(*beams[b], view, masks, drawing.mask_share);
+      }
+      drawing.masks = &masks;
       drawing.is_complete = b + 1 == beams.size();
       draw(drawing);
+      drawing.masks = nullptr;
     }
     if (beams.empty()) draw(drawing);
   } else {

@@ -12,15 +12,15 @@ namespace transom {
 /// What one picture is made of.
 struct FrameRenderer::Drawing {
   const Lighting& lighting;
-  const Masks& masks;
   CameraRays camera;
   glm::vec3 eye;
   bool has_components;
   Frame& frame;
   std::vector<SeenBeam> beams{};
-  const std::vector<float>* mask_share = nullptr;  ///< by stencil volumes; null: by rays
-  bool is_begun = false, is_complete = true;       ///< beams have been drawn before; none will be later
-  std::vector<glm::vec4> shown{};                  ///< what the samples' shares are of
+  const Masks* masks = nullptr;  ///< of stencil volumes; null: by rays
+  std::vector<float> mask_share{};
+  bool is_begun = false, is_complete = true;  ///< beams have been drawn before; none will be later
+  std::vector<glm::vec4> shown{};             ///< what the samples' shares are of
 };
 
 /// Memory that is kept from row to row.

@@ -38,9 +38,9 @@ void FrameRenderer::find_centre_shares(const Drawing& drawing, std::size_t beam,
     if (!std::exchange(is_reached, true)) std::fill(shares, shares + width, 0.f);
     const std::span<const BeamPoint> points(&samples_->centre[group.first], group.last - group.first);
     const std::span<float> of_group(shares + group.first - y * width, points.size());
-    if (drawing.mask_share)
+    if (drawing.masks)
       for (std::size_t i = 0; i < points.size(); ++i)
-        of_group[i] = seen.faces(points[i]) ? (*drawing.mask_share)[drawing.masks.index(points[i].pixel, -1)] : 0.f;
+        of_group[i] = seen.faces(points[i]) ? drawing.mask_share[drawing.masks->index(points[i].pixel, -1)] : 0.f;
     else
       seen.find_shares(group.surface, points, of_group, rays);
   }
@@ -66,7 +66,7 @@ void FrameRenderer::add_to_pixels(const Drawing& drawing, std::size_t beam, int 
   const float* const above = row > 0 ? centre_shares(beam, row - 1) : own;
   const float* const below = row + 1 < height ? centre_shares(beam, row + 1) : own;
   const bool is_dark = own == dark_row_.data() && above == own && below == own;
-  if (!drawing.mask_share && is_dark) return;
+  if (!drawing.masks && is_dark) return;
   scratch.highest.resize(static_cast<std::size_t>(width));
   scratch.lowest.resize(static_cast<std::size_t>(width));
   float *const highest = scratch.highest.data(), *const lowest = scratch.lowest.data();
@@ -80,7 +80,7 @@ void FrameRenderer::add_to_pixels(const Drawing& drawing, std::size_t beam, int 
            own[x] - std::min(std::min(lowest[left], lowest[right]), lowest[x]) > kSameShare;
   };
   const auto masks_differ = [&](int pixel) {
-    const auto of_mask = [&](int sample) { return (*drawing.mask_share)[drawing.masks.index(pixel, sample)]; };
+    const auto of_mask = [&](int sample) { return drawing.mask_share[drawing.masks->index(pixel, sample)]; };
     for (int k = 0; k < s * s; ++k)
       if (of_mask(k) != of_mask(-1)) return true;
     return false;
@@ -91,7 +91,8 @@ void FrameRenderer::add_to_pixels(const Drawing& drawing, std::size_t beam, int 
     for (std::size_t p = group.first; p < group.last; ++p) {
       if (samples.has_edge[p]) continue;
       const int x = samples.centre[p].pixel - row * width;
-      if (s > 1 && (differs(x) || (drawing.mask_share && masks_differ(samples.centre[p].pixel))))
+      if (s > 1 &&
+          (differs(x) || (drawing.masks && drawing.masks->holds(x, row) && masks_differ(samples.centre[p].pixel))))
         scratch.chosen.push_back(p);
       else if (own[x] > 0)
         sun[x] += seen.reflected(samples.centre[p], own[x]);
@@ -148,12 +149,12 @@ void FrameRenderer::add_to_parts(const Drawing& drawing, std::size_t beam, int r
     if (!seen.may_light(part)) continue;
     const std::span<const BeamPoint> points(&samples.fine[part.first], part.last - part.first);
     const std::span<float> shares = shares_of(part);
-    if (!drawing.mask_share || points[0].sample == BeamPoint::kNotInMasks)
+    if (!drawing.masks || points[0].sample == BeamPoint::kNotInMasks)
       seen.find_shares(part.surface, points, shares, scratch.rays);
     else
       for (std::size_t k = 0; k < points.size(); ++k)
         shares[k] =
-            seen.faces(points[k]) ? (*drawing.mask_share)[drawing.masks.index(points[k].pixel, points[k].sample)] : 0.f;
+            seen.faces(points[k]) ? drawing.mask_share[drawing.masks->index(points[k].pixel, points[k].sample)] : 0.f;
   }
   seen.trace(scratch.rays);
 

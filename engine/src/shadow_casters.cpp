@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <numeric>
 #include <tuple>
 #include <utility>
@@ -134,13 +135,52 @@ int ShadowCasters::facing(const Triangle& triangle, glm::dvec3 direction_to_sun)
   return 0;
 }
 
+ShadedPoints::ShadedPoints(glm::dvec3 direction_to_sun, std::span<const std::pair<glm::vec3, glm::vec3>> boxes)
+    : are_all_(boxes.empty()),
+      low_(std::numeric_limits<double>::infinity()),
+      high_(-std::numeric_limits<double>::infinity()) {
+  const glm::dvec3 towards = glm::normalize(direction_to_sun),
+                   other = std::abs(towards.z) < 0.9 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0),
+                   across = glm::normalize(glm::cross(other, towards));
+  beam_from_world_ = glm::transpose(glm::dmat3(across, glm::cross(towards, across), towards));
+  const glm::dmat3 reach(glm::abs(beam_from_world_[0]), glm::abs(beam_from_world_[1]), glm::abs(beam_from_world_[2]));
+  for (const auto& [low, high] : boxes) {
+    const glm::dvec3 middle = beam_from_world_ * (0.5 * (glm::dvec3(low) + glm::dvec3(high))),
+                     half = reach * (0.5 * (glm::dvec3(high) - glm::dvec3(low)));
+    low_ = glm::min(low_, middle - half);
+    high_ = glm::max(high_, middle + half);
+  }
+}
+
+bool ShadedPoints::may_be_shaded_by(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) const {
+  if (are_all_) return true;
+  const glm::dvec3 at_a = beam_from_world_ * glm::dvec3(a), at_b = beam_from_world_ * glm::dvec3(b),
+                   at_c = beam_from_world_ * glm::dvec3(c);
+  const glm::dvec3 low = glm::min(at_a, glm::min(at_b, at_c)), high = glm::max(at_a, glm::max(at_b, at_c));
+  return high.x >= low_.x && low.x <= high_.x && high.y >= low_.y && low.y <= high_.y && high.z >= low_.z;
+}
+
 VolumeTriangles ShadowCasters::volume(glm::dvec3 direction_to_sun, std::uint32_t infinity_index) const {
+  return volume_of(direction_to_sun, infinity_index, [](const glm::uvec3&) { return true; });
+}
+
+// Each triangle's own volume is closed: those of the others are right without it.
+VolumeTriangles ShadowCasters::volume(glm::dvec3 direction_to_sun, std::uint32_t infinity_index,
+                                      std::span<const glm::vec3> vertices, const ShadedPoints& points) const {
+  return volume_of(direction_to_sun, infinity_index, [&](const glm::uvec3& corner) {
+    return points.may_be_shaded_by(vertices[corner.x], vertices[corner.y], vertices[corner.z]);
+  });
+}
+
+template <typename Casts>
+VolumeTriangles ShadowCasters::volume_of(glm::dvec3 direction_to_sun, std::uint32_t infinity_index,
+                                         const Casts& casts) const {
   VolumeTriangles volume;
   std::vector<int> multiplicity(edges_.size(), 0);  // in the direction from -> to
   std::vector<std::uint32_t> fronts;
   for (const Triangle& triangle : triangles_) {
     const int side = facing(triangle, direction_to_sun);
-    if (side == 0) continue;
+    if (side == 0 || !casts(triangle.vertices)) continue;
     for (int i = 0; i < 3; ++i) {
       multiplicity[triangle.edges[i]] += side * triangle.along[i];
       (side > 0 ? fronts : volume.indices).push_back(triangle.vertices[i]);

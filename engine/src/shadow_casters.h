@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace transom {
@@ -30,6 +31,20 @@ struct VolumeTriangles {
   bool empty() const { return indices.empty(); }
 };
 
+/// Points on which shade is wanted, seen along parallel light: bounds across it (x, y) and towards its source (z).
+class ShadedPoints {
+ public:
+  /// boxes: two corners each; none: all points there are.
+  ShadedPoints(glm::dvec3 direction_to_sun, std::span<const std::pair<glm::vec3, glm::vec3>> boxes);
+  /// Whether shade of a triangle may fall on any of them.
+  bool may_be_shaded_by(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) const;
+
+ private:
+  glm::dmat3 beam_from_world_;
+  bool are_all_;
+  glm::dvec3 low_, high_;
+};
+
 /// Shadow casters, prepared once for any sun.
 class ShadowCasters {
  public:
@@ -41,6 +56,9 @@ class ShadowCasters {
   /// triangle, its third vertex `infinity_index` the point at infinity: parallel light needs no far cap, since it would
   /// be that one point [Everitt & Kilgard 2002].
   VolumeTriangles volume(glm::dvec3 direction_to_sun, std::uint32_t infinity_index) const;
+  /// The same of the triangles whose shade may fall on some points. vertices: those that the casters were made of.
+  VolumeTriangles volume(glm::dvec3 direction_to_sun, std::uint32_t infinity_index, std::span<const glm::vec3> vertices,
+                         const ShadedPoints& points) const;
 
  private:
   struct Edge {
@@ -58,6 +76,8 @@ class ShadowCasters {
 
   void connect_edges();
   void find_solids(std::span<const glm::vec3> vertices);
+  template <typename Casts>
+  VolumeTriangles volume_of(glm::dvec3 direction_to_sun, std::uint32_t infinity_index, const Casts& casts) const;
   static int facing(const Triangle& triangle, glm::dvec3 direction_to_sun);
 
   std::vector<Triangle> triangles_;

@@ -14,6 +14,8 @@
 
 namespace transom {
 
+class SeenBeam;
+
 /// How beams are tested per pixel.
 enum class Visibility { kRays, kVolumes };
 
@@ -83,9 +85,10 @@ class FrameRenderer {
     glm::vec3 normal;
   };
   void see(const View& view, int edge_samples);
+  VolumeRange lit_range(const SeenBeam& seen) const;
   void make_volumes();
   int render_mask(const Beam& beam, const View& view, const Masks& masks, std::vector<float>& share);
-  int render_shafts(const Beam& lobe, const VolumeCamera& camera, std::vector<float>& share);
+  int render_shafts(const Beam& lobe, const VolumeCamera& camera, const Masks& masks, std::vector<float>& share);
   const VolumeCasters& casters_behind(glm::vec4 plane);
   void draw(Drawing& drawing);
   void find_centre_shares(const Drawing& drawing, std::size_t beam, int row);
