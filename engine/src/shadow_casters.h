@@ -31,7 +31,7 @@ struct VolumeTriangles {
   bool empty() const { return indices.empty(); }
 };
 
-/// Points on which shade is wanted, seen along parallel light: bounds across it (x, y) and towards its source (z).
+/// Points on which shade is wanted, as parallel light sees them: in columns along it, from where each begins.
 class ShadedPoints {
  public:
   /// boxes: two corners each; none: all points there are.
@@ -40,9 +40,16 @@ class ShadedPoints {
   bool may_be_shaded_by(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) const;
 
  private:
-  glm::dmat3 beam_from_world_;
+  /// Columns that bounds across the light lie in; none where `first` is not below `last`.
+  struct Columns {
+    glm::ivec2 first, last;
+  };
+  Columns columns(glm::dvec2 low, glm::dvec2 high) const;
+
+  glm::dmat3 beam_from_world_;  // across the light: x and y; towards its source: z
   bool are_all_;
-  glm::dvec3 low_, high_;
+  glm::dvec2 low_, high_;
+  std::vector<double> farthest_;  // by column: least z of a point
 };
 
 /// Shadow casters, prepared once for any sun.

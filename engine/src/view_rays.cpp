@@ -82,6 +82,7 @@ std::span<const PixelParts::Part> PixelParts::tell_apart(std::span<const Seen> c
     parts_[part].places.push_back(static_cast<int>(k));
     part_at_.push_back(part);
   }
+  find_whole_places();
   for (std::size_t k = 0; k < coarse.size(); ++k) {
     const std::size_t part = part_of(name_of(coarse[k]));
     if (part < names_.size()) parts_[part].samples.push_back({&coarse[k], place_in_masks(part, static_cast<int>(k))});
@@ -97,21 +98,26 @@ std::size_t PixelParts::part_of(std::int64_t name) const {
   return static_cast<std::size_t>(std::find(names_.begin(), names_.end(), name) - names_.begin());
 }
 
-// A place of the coarser grid around which only this part is seen, so that the middle of its square, where masks are
-// drawn, sees it too: the own one, or another.
-int PixelParts::place_in_masks(std::size_t part, int own) const {
-  const auto is_whole = [&](int place) {
+// By place of the coarser grid: the part that is all that is seen around it, so that the middle of its square, where
+// masks are drawn, sees it too; kNone where there are several.
+void PixelParts::find_whole_places() {
+  whole_.clear();
+  for (int place = 0; place < s_ * s_; ++place) {
+    const int first = (place / s_ * kFiner) * kFiner * s_ + place % s_ * kFiner;
+    const std::size_t part = part_at_[static_cast<std::size_t>(first)];
+    bool is_whole = true;
     for (int j = 0; j < kFiner; ++j)
       for (int i = 0; i < kFiner; ++i)
-        if (part_at_[static_cast<std::size_t>((place / s_ * kFiner + j) * kFiner * s_ + place % s_ * kFiner + i)] !=
-            part)
-          return false;
-    return true;
-  };
-  if (is_whole(own)) return own;
-  for (int place = 0; place < s_ * s_; ++place)
-    if (is_whole(place)) return place;
-  return BeamPoint::kNotInMasks;
+        is_whole &= part_at_[static_cast<std::size_t>(first + j * kFiner * s_ + i)] == part;
+    whole_.push_back(is_whole ? part : kNone);
+  }
+}
+
+// A place in masks that sees a part: the own one, or another.
+int PixelParts::place_in_masks(std::size_t part, int own) const {
+  if (whole_[static_cast<std::size_t>(own)] == part) return own;
+  const auto place = std::find(whole_.begin(), whole_.end(), part);
+  return place == whole_.end() ? BeamPoint::kNotInMasks : static_cast<int>(place - whole_.begin());
 }
 
 }  // namespace transom

@@ -66,12 +66,16 @@ class PixelParts {
 
  private:
   std::size_t part_of(std::int64_t name) const;
+  void find_whole_places();
   int place_in_masks(std::size_t part, int own) const;
+
+  static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
   int s_;
   std::vector<std::int64_t> names_;
   std::vector<Part> parts_;           // the first of them, as many as there are names
   std::vector<std::size_t> part_at_;  // by place of the finer grid
+  std::vector<std::size_t> whole_;    // by place of the coarser grid
 };
 
 }  // namespace transom

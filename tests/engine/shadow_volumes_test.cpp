@@ -436,7 +436,9 @@ TEST(ShadowCastersTest, CastersWhoseShadeFallsElsewhereAreLeftOut) {
   EXPECT_EQ(corners_for({-1, -1, 0}, {6, 2, 0}), casters.volume(sun, 99).indices.size());
   EXPECT_EQ(corners_for({0, 0, 0}, {1, 1, 0}), casters.volume(sun, 99).indices.size() / 2);
   EXPECT_EQ(corners_for({2, 0, 0}, {3, 1, 0}), 0U);  // between them
-  EXPECT_EQ(corners_for({0, 0, 3}, {5, 1, 4}), 0U);  // above both
+  const std::vector<std::pair<glm::vec3, glm::vec3>> apart{{{-1, 0, 0}, {-0.5F, 1, 0}}, {{5.5F, 0, 0}, {6, 1, 0}}};
+  EXPECT_EQ(casters.volume(sun, 99, scene.vertices, ShadedPoints(sun, apart)).indices.size(), 0U);  // beside both
+  EXPECT_EQ(corners_for({0, 0, 3}, {5, 1, 4}), 0U);                                                 // above both
 }
 
 TEST(ShadowCastersTest, WeldsEqualPositionsOnly) {
