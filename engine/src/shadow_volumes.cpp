@@ -16,6 +16,7 @@
 
 #include "shadow_casters.h"
 #include "transom/error.h"
+#include "volume_program.h"
 #include "volume_projection.h"
 
 namespace transom {
@@ -29,46 +30,6 @@ constexpr int kLargestSide = 4096;  // pixels
 /// buffer. More would move shadow edges where a side is seen nearly edge-on, since its slope is steep.
 constexpr float kOffsetSlopeShare = 1.0F / 512;
 constexpr float kOffsetDepthSteps = 2;
-
-constexpr const char* kVertexShader = R"(#version 330 core
-layout(location = 0) in vec4 position;  // w = 0: a direction, the point at infinity
-uniform mat4 clip_from_world;
-void main() {
-  gl_Position = clip_from_world * position;
-  // Depth clamp is wanted beyond the farthest depth only. Nearer than the nearest one it would divide by a w of almost
-  // nothing, and the depth interpolated across such a triangle is noise.
-  gl_ClipDistance[0] = gl_Position.z + gl_Position.w;
-}
-)";
-constexpr const char* kFragmentShader = "#version 330 core\nvoid main() {}\n";
-
-GLuint compile_shader(const GladGLContext& gl, GLenum kind, const char* source) {
-  const GLuint shader = gl.CreateShader(kind);
-  gl.ShaderSource(shader, 1, &source, nullptr);
-  gl.CompileShader(shader);
-  GLint compiled = 0;
-  gl.GetShaderiv(shader, GL_COMPILE_STATUS, &compiled);
-  if (compiled) return shader;
-  std::array<char, 1024> log{};
-  gl.GetShaderInfoLog(shader, static_cast<GLsizei>(log.size()), nullptr, log.data());
-  gl.DeleteShader(shader);
-  throw GlError(std::string("Shadow volumes: a shader does not compile: ") + log.data());
-}
-
-GLuint link_program(const GladGLContext& gl) {
-  const GLuint program = gl.CreateProgram();
-  for (const auto& [kind, source] : {std::pair<GLenum, const char*>{GL_VERTEX_SHADER, kVertexShader},
-                                     std::pair<GLenum, const char*>{GL_FRAGMENT_SHADER, kFragmentShader}}) {
-    const GLuint shader = compile_shader(gl, kind, source);
-    gl.AttachShader(program, shader);
-    gl.DeleteShader(shader);
-  }
-  gl.LinkProgram(program);
-  GLint linked = 0;
-  gl.GetProgramiv(program, GL_LINK_STATUS, &linked);
-  if (!linked) throw GlError("Shadow volumes: the shader program does not link");
-  return program;
-}
 
 bool is_finite(glm::dvec3 v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -211,7 +172,7 @@ ShadowVolumes::Impl::~Impl() {
 }
 
 void ShadowVolumes::Impl::create_objects() {
-  program_ = link_program(gl_);
+  program_ = link_volume_program(gl_);
   clip_from_world_location_ = gl_.GetUniformLocation(program_, "clip_from_world");
 
   gl_.GenVertexArrays(1, &other_array_);
