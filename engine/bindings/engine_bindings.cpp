@@ -29,10 +29,11 @@ template <typename T, typename... Shape>
 using In = nb::ndarray<const T, Shape..., nb::c_contig, nb::device::cpu>;
 
 // An array that owns `values` (moved, not copied) and shows them with the given shape.
-template <typename Scalar, typename Value>
-nb::ndarray<nb::numpy, Scalar> to_array(std::vector<Value>&& values, std::vector<std::size_t> shape) {
-  auto* kept = new std::vector<Value>(std::move(values));
-  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<Value>*>(p); });
+template <typename Scalar, typename Value, typename Memory>
+nb::ndarray<nb::numpy, Scalar> to_array(std::vector<Value, Memory>&& values, std::vector<std::size_t> shape) {
+  using Values = std::vector<Value, Memory>;
+  auto* kept = new Values(std::move(values));
+  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<Values*>(p); });
   return nb::ndarray<nb::numpy, Scalar>(kept->data(), shape.size(), shape.data(), owner);
 }
 
@@ -42,7 +43,7 @@ std::vector<Value> to_vector(const Array& array) {
   return std::vector<Value>(begin, begin + array.size() * sizeof(*array.data()) / sizeof(Value));
 }
 
-nb::ndarray<nb::numpy, float> picture(std::vector<glm::vec3>&& pixels, int width, int height) {
+nb::ndarray<nb::numpy, float> picture(Picture&& pixels, int width, int height) {
   return to_array<float>(std::move(pixels), {static_cast<std::size_t>(height), static_cast<std::size_t>(width), 3});
 }
 

@@ -104,12 +104,12 @@ void BeamOutlines::along_beam(const Points& points, Points& seen) const {
   coordinate(towards_, seen.z);
 }
 
-void BeamOutlines::mark_behind(int k, const Points& seen, std::span<int> is_behind) const {
+void BeamOutlines::mark_behind(int k, std::span<const float> x, std::span<const float> y, std::span<const float> z,
+                               std::span<int> is_behind) const {
   const Passage& passage = passages_[static_cast<std::size_t>(k)];
   const auto [a, b, c, d] = passage.inwards;
   const glm::vec3 depth = passage.depth;
   const int lets_light_in = passage.is_edge_on ? 0 : 1;
-  const float *x = seen.x.data(), *y = seen.y.data(), *z = seen.z.data();
   for (std::size_t i = 0; i < is_behind.size(); ++i) {
     const auto along = [&](glm::vec3 line) { return line.x * x[i] + line.y * y[i] + line.z; };
     is_behind[i] = static_cast<int>(along(a) >= 0) & static_cast<int>(along(b) >= 0) & static_cast<int>(along(c) >= 0) &

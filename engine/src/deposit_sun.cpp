@@ -92,7 +92,7 @@ void DirectLight::sun_transmission(const Sun& sun, const SunlitSlot& slot, const
   sun.outlines.along_beam(points, scratch.along_beam);
   std::fill(share.begin(), share.end(), 1.f);
   for (const int k : slot.passages) {
-    sun.outlines.mark_behind(k, scratch.along_beam, scratch.is_behind);
+    sun.outlines.mark_behind(k, scratch.along_beam.x, scratch.along_beam.y, scratch.along_beam.z, scratch.is_behind);
     const float transmittance = sun.transmittance[k];
     for (std::size_t i = 0; i < count; ++i) {
       share[i] *= is_behind[i] ? transmittance : 1.f;

@@ -6,6 +6,7 @@
 #include <map>
 #include <tuple>
 
+#include "frame_beams.h"
 #include "transom/parallel.h"
 
 namespace transom {
@@ -44,6 +45,28 @@ VolumeCasters casters_of(const std::vector<Triangle>& triangles, bool are_solids
 }
 
 }  // namespace
+
+// The pixels that a beam may light, and their points. A margin of a pixel holds the samples around these.
+VolumeRange FrameRenderer::lit_range(const SeenBeam& seen) const {
+  const int width = samples_->view.width, height = samples_->view.height;
+  VolumeRange range{width, height, 0, 0, {}};
+  const auto take = [&](const BeamGroup& group, const BeamPoint& first, const BeamPoint& last) {
+    if (!seen.may_light(group)) return;
+    const int y = first.pixel / width;
+    range.left = std::min(range.left, std::max(first.pixel % width - 1, 0));
+    range.right = std::max(range.right, std::min(last.pixel % width + 2, width));
+    range.top = std::min(range.top, std::max(y - 1, 0));
+    range.bottom = std::max(range.bottom, std::min(y + 2, height));
+    const glm::vec3 margin = glm::max(group.high - group.low, glm::vec3(engine_.faces().ray_offset()));
+    range.boxes.emplace_back(group.low - margin, group.high + margin);
+  };
+  for (const ViewSamples::Row& row : samples_->rows) {
+    for (const BeamGroup& group : row.centre_groups)
+      take(group, samples_->centre[group.first], samples_->centre[group.last - 1]);
+    for (const ViewSamples::Part& part : row.parts) take(part, row.fine[part.first], row.fine[part.last - 1]);
+  }
+  return range;
+}
 
 void FrameRenderer::make_volumes() {
   if (volumes_) return;
@@ -92,8 +115,12 @@ int FrameRenderer::render_mask(const Beam& beam, const View& view, const Masks& 
   const glm::dvec3 origin = engine_.faces().origin;
   const VolumeCamera camera{view.position - origin, view.target - origin,       view.up,
                             view.vertical_fov_rad,  view.width * masks.scale(), view.height * masks.scale()};
-  if (beam.opening >= 0) return render_shafts(beam, camera, share);
-  const BeamMask mask = volumes_->render(camera, glm::dvec3(beam.direction_to_source));
+  if (masks.is_empty()) {
+    share.clear();
+    return 0;
+  }
+  if (beam.opening >= 0) return render_shafts(beam, camera, masks, share);
+  const BeamMask mask = volumes_->render(camera, glm::dvec3(beam.direction_to_source), masks.range());
   std::vector<float> transmittance;
   for (const VolumeGroup& group : volume_groups_)
     transmittance.push_back(
@@ -109,8 +136,11 @@ int FrameRenderer::render_mask(const Beam& beam, const View& view, const Masks& 
 
 // The same for a lobe: two passes for its shafts behind each plane of panels, and for each share that panes before it
 // leave.
-int FrameRenderer::render_shafts(const Beam& lobe, const VolumeCamera& camera, std::vector<float>& share) {
-  share.assign(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height), 0.f);
+int FrameRenderer::render_shafts(const Beam& lobe, const VolumeCamera& camera, const Masks& masks,
+                                 std::vector<float>& share) {
+  const VolumeRange range = masks.range();
+  share.assign(static_cast<std::size_t>(range.right - range.left) * static_cast<std::size_t>(range.bottom - range.top),
+               0.f);
   int passes = 0;
   const glm::dvec3 source(lobe.direction_to_source);
   std::vector<const LightShaft*> rest;
@@ -124,10 +154,10 @@ int FrameRenderer::render_shafts(const Beam& lobe, const VolumeCamera& camera, s
     for (const LightShaft* shaft : rest)
       for (std::size_t k = 2; is_alike(shaft) && k < shaft->corner.size(); ++k)
         lit.push_back({shaft->corner[0], shaft->corner[k - 1], shaft->corner[k]});
-    const std::vector<std::uint8_t> inside = volumes_->count(camera, source, casters_of(lit, false));
+    const std::vector<std::uint8_t> inside = volumes_->count(camera, source, casters_of(lit, false), range);
     passes += volumes_->pass_count();
     if (std::any_of(inside.begin(), inside.end(), [](std::uint8_t n) { return n > 0; })) {
-      const std::vector<std::uint8_t> blocked = volumes_->count(camera, source, casters_behind(first.plane));
+      const std::vector<std::uint8_t> blocked = volumes_->count(camera, source, casters_behind(first.plane), range);
       passes += volumes_->pass_count();
       for (std::size_t i = 0; i < share.size(); ++i)
         if (inside[i] && !blocked[i]) share[i] = first.share;

@@ -3,32 +3,45 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 #include "transom/frame.h"
 
 namespace transom {
 
 /// Where samples of a picture are in a mask. Masks are as fine as the samples of edges, or as OpenGL's largest picture
-/// allows.
+/// allows, and of a range of its pixels.
 class FrameRenderer::Masks {
  public:
-  Masks(const View& view, int edge_samples)
+  /// range: of the picture's pixels.
+  Masks(const View& view, int edge_samples, VolumeRange range)
       : width_(view.width),
         samples_(edge_samples),
-        scale_(std::clamp(kLargestSide / std::max(view.width, view.height), 1, edge_samples)) {}
+        scale_(std::clamp(kLargestSide / std::max(view.width, view.height), 1, edge_samples)),
+        range_(std::move(range)) {}
 
   int scale() const { return scale_; }
-  /// Of a sample of a pixel; -1: its centre.
+  /// The range in pixels of masks.
+  VolumeRange range() const {
+    return {scale_ * range_.left, scale_ * range_.top, scale_ * range_.right, scale_ * range_.bottom, range_.boxes};
+  }
+  bool is_empty() const { return range_.left >= range_.right; }
+  bool holds(int x, int y) const {
+    return x >= range_.left && x < range_.right && y >= range_.top && y < range_.bottom;
+  }
+  /// Of a sample of a pixel in the range; -1: its centre.
   std::size_t index(int pixel, int sample) const {
     const int i = sample < 0 ? samples_ / 2 : sample % samples_, j = sample < 0 ? samples_ / 2 : sample / samples_;
-    const int column = pixel % width_ * scale_ + (2 * i + 1) * scale_ / (2 * samples_),
-              row = pixel / width_ * scale_ + (2 * j + 1) * scale_ / (2 * samples_);
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(width_ * scale_) + static_cast<std::size_t>(column);
+    const int column = (pixel % width_ - range_.left) * scale_ + (2 * i + 1) * scale_ / (2 * samples_),
+              row = (pixel / width_ - range_.top) * scale_ + (2 * j + 1) * scale_ / (2 * samples_);
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>((range_.right - range_.left) * scale_) +
+           static_cast<std::size_t>(column);
   }
 
  private:
   static constexpr int kLargestSide = 4096;  // pixels
   int width_, samples_, scale_;
+  VolumeRange range_;
 };
 
 }  // namespace transom

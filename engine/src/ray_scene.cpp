@@ -60,6 +60,13 @@ void load_rays(std::span<const Ray> rays, RTCRay16& packet, int* valid) {
   }
 }
 
+void forget_hits(RTCHit16& hit) {
+  for (std::size_t i = 0; i < kWidth; ++i) {
+    hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
+}
+
 }  // namespace
 
 struct RayScene::Tree {
@@ -118,25 +125,48 @@ void RayScene::intersect(What what, std::span<const Ray> rays, std::span<Hit> hi
   for (std::size_t begin = 0; begin < rays.size(); begin += kWidth) {
     const std::size_t count = std::min(kWidth, rays.size() - begin);
     load_rays(rays.subspan(begin, count), packet.ray, valid);
-    for (std::size_t i = 0; i < kWidth; ++i) {
-      packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-      packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-    }
+    forget_hits(packet.hit);
     intersect16(valid, tree.scene, &packet, order);
-    for (std::size_t i = 0; i < count; ++i) {
-      Hit& hit = hits[begin + i];
-      if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
-        hit = Hit{};
-        continue;
-      }
-      const unsigned triangle = packet.hit.primID[i];
-      hit.face = tree.face_of_triangle[triangle];
-      const Face& face = faces_.faces[static_cast<std::size_t>(hit.face)];
-      hit.side = glm::dot(rays[begin + i].direction, face.normal) < 0 ? 0 : 1;
-      hit.t = packet.ray.tfar[i];
-      hit.st = face.parameters(tree.part_of_triangle[triangle], {packet.hit.u[i], packet.hit.v[i]});
-    }
+    for (std::size_t i = 0; i < count; ++i)
+      hits[begin + i] = packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID
+                            ? Hit{}
+                            : hit_of(tree, packet.hit.primID[i], {packet.hit.u[i], packet.hit.v[i]}, packet.ray.tfar[i],
+                                     rays[begin + i].direction);
   }
+}
+
+void RayScene::intersect_from(glm::vec3 origin, const float* x, const float* y, const float* z, What what,
+                              std::span<Hit> hits) const {
+  const Tree& tree = *trees_[static_cast<std::size_t>(what)];
+  alignas(64) int valid[kWidth];
+  RTCRayHit16 packet;
+  const Ray ray{origin};
+  load_rays({&ray, 1}, packet.ray, valid);
+  for (std::size_t begin = 0; begin < hits.size(); begin += kWidth) {
+    const std::size_t count = std::min(kWidth, hits.size() - begin);
+    for (std::size_t i = 0; i < kWidth; ++i) {
+      const std::size_t k = begin + std::min(i, count - 1);
+      valid[i] = i < count ? -1 : 0;
+      packet.ray.dir_x[i] = x[k];
+      packet.ray.dir_y[i] = y[k];
+      packet.ray.dir_z[i] = z[k];
+      packet.ray.tfar[i] = Ray::kInfinity;
+    }
+    forget_hits(packet.hit);
+    intersect16(valid, tree.scene, &packet, Order::kCoherent);
+    for (std::size_t i = 0; i < count; ++i)
+      hits[begin + i] = packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID
+                            ? Hit{}
+                            : hit_of(tree, packet.hit.primID[i], {packet.hit.u[i], packet.hit.v[i]}, packet.ray.tfar[i],
+                                     {x[begin + i], y[begin + i], z[begin + i]});
+  }
+}
+
+Hit RayScene::hit_of(const Tree& tree, unsigned triangle, glm::vec2 barycentric, float t, glm::vec3 direction) const {
+  const int index = tree.face_of_triangle[triangle];
+  const Face& face = faces_.faces[static_cast<std::size_t>(index)];
+  return {index, glm::dot(direction, face.normal) < 0 ? 0 : 1, t,
+          face.parameters(tree.part_of_triangle[triangle], barycentric)};
 }
 
 void RayScene::occluded(What what, std::span<const Ray> rays, std::span<std::uint8_t> blocked, Order order) const {

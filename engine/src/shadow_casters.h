@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace transom {
@@ -30,6 +31,27 @@ struct VolumeTriangles {
   bool empty() const { return indices.empty(); }
 };
 
+/// Points on which shade is wanted, as parallel light sees them: in columns along it, from where each begins.
+class ShadedPoints {
+ public:
+  /// boxes: two corners each; none: all points there are.
+  ShadedPoints(glm::dvec3 direction_to_sun, std::span<const std::pair<glm::vec3, glm::vec3>> boxes);
+  /// Whether shade of a triangle may fall on any of them.
+  bool may_be_shaded_by(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) const;
+
+ private:
+  /// Columns that bounds across the light lie in; none where `first` is not below `last`.
+  struct Columns {
+    glm::ivec2 first, last;
+  };
+  Columns columns(glm::dvec2 low, glm::dvec2 high) const;
+
+  glm::dmat3 beam_from_world_;  // across the light: x and y; towards its source: z
+  bool are_all_;
+  glm::dvec2 low_, high_;
+  std::vector<double> farthest_;  // by column: least z of a point
+};
+
 /// Shadow casters, prepared once for any sun.
 class ShadowCasters {
  public:
@@ -41,6 +63,9 @@ class ShadowCasters {
   /// triangle, its third vertex `infinity_index` the point at infinity: parallel light needs no far cap, since it would
   /// be that one point [Everitt & Kilgard 2002].
   VolumeTriangles volume(glm::dvec3 direction_to_sun, std::uint32_t infinity_index) const;
+  /// The same of the triangles whose shade may fall on some points. vertices: those that the casters were made of.
+  VolumeTriangles volume(glm::dvec3 direction_to_sun, std::uint32_t infinity_index, std::span<const glm::vec3> vertices,
+                         const ShadedPoints& points) const;
 
  private:
   struct Edge {
@@ -58,6 +83,8 @@ class ShadowCasters {
 
   void connect_edges();
   void find_solids(std::span<const glm::vec3> vertices);
+  template <typename Casts>
+  VolumeTriangles volume_of(glm::dvec3 direction_to_sun, std::uint32_t infinity_index, const Casts& casts) const;
   static int facing(const Triangle& triangle, glm::dvec3 direction_to_sun);
 
   std::vector<Triangle> triangles_;

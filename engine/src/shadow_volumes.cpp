@@ -16,6 +16,7 @@
 
 #include "shadow_casters.h"
 #include "transom/error.h"
+#include "volume_program.h"
 #include "volume_projection.h"
 
 namespace transom {
@@ -29,46 +30,6 @@ constexpr int kLargestSide = 4096;  // pixels
 /// buffer. More would move shadow edges where a side is seen nearly edge-on, since its slope is steep.
 constexpr float kOffsetSlopeShare = 1.0F / 512;
 constexpr float kOffsetDepthSteps = 2;
-
-constexpr const char* kVertexShader = R"(#version 330 core
-layout(location = 0) in vec4 position;  // w = 0: a direction, the point at infinity
-uniform mat4 clip_from_world;
-void main() {
-  gl_Position = clip_from_world * position;
-  // Depth clamp is wanted beyond the farthest depth only. Nearer than the nearest one it would divide by a w of almost
-  // nothing, and the depth interpolated across such a triangle is noise.
-  gl_ClipDistance[0] = gl_Position.z + gl_Position.w;
-}
-)";
-constexpr const char* kFragmentShader = "#version 330 core\nvoid main() {}\n";
-
-GLuint compile_shader(const GladGLContext& gl, GLenum kind, const char* source) {
-  const GLuint shader = gl.CreateShader(kind);
-  gl.ShaderSource(shader, 1, &source, nullptr);
-  gl.CompileShader(shader);
-  GLint compiled = 0;
-  gl.GetShaderiv(shader, GL_COMPILE_STATUS, &compiled);
-  if (compiled) return shader;
-  std::array<char, 1024> log{};
-  gl.GetShaderInfoLog(shader, static_cast<GLsizei>(log.size()), nullptr, log.data());
-  gl.DeleteShader(shader);
-  throw GlError(std::string("Shadow volumes: a shader does not compile: ") + log.data());
-}
-
-GLuint link_program(const GladGLContext& gl) {
-  const GLuint program = gl.CreateProgram();
-  for (const auto& [kind, source] : {std::pair<GLenum, const char*>{GL_VERTEX_SHADER, kVertexShader},
-                                     std::pair<GLenum, const char*>{GL_FRAGMENT_SHADER, kFragmentShader}}) {
-    const GLuint shader = compile_shader(gl, kind, source);
-    gl.AttachShader(program, shader);
-    gl.DeleteShader(shader);
-  }
-  gl.LinkProgram(program);
-  GLint linked = 0;
-  gl.GetProgramiv(program, GL_LINK_STATUS, &linked);
-  if (!linked) throw GlError("Shadow volumes: the shader program does not link");
-  return program;
-}
 
 bool is_finite(glm::dvec3 v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -87,6 +48,16 @@ void check_camera(const VolumeCamera& camera) {
   if (!is_finite(camera.position) || !is_finite(side) || !(glm::length(side) > 0)) {
     throw InputError("Shadow volumes: the camera's position, target and up do not span a picture");
   }
+}
+
+void check_range(const VolumeRange& range, const VolumeCamera& camera) {
+  if (range.left < 0 || range.top < 0 || range.left >= range.right || range.top >= range.bottom ||
+      range.right > camera.width || range.bottom > camera.height)
+    throw InputError("Shadow volumes: the range is empty or reaches beyond the picture");
+}
+
+std::size_t pixel_count(const VolumeRange& range) {
+  return static_cast<std::size_t>(range.right - range.left) * static_cast<std::size_t>(range.bottom - range.top);
 }
 
 }  // namespace
@@ -113,9 +84,10 @@ class ShadowVolumes::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  BeamMask render(const VolumeCamera& camera, glm::dvec3 direction_to_sun);
+  BeamMask render(const VolumeCamera& camera, glm::dvec3 direction_to_sun, const VolumeRange& range);
   std::vector<std::uint8_t> count(const VolumeCamera& camera, glm::dvec3 direction_to_source,
-                                  const std::vector<glm::vec3>& vertices, const ShadowCasters& casters);
+                                  const std::vector<glm::vec3>& vertices, const ShadowCasters& casters,
+                                  const VolumeRange& range);
   int pass_count() const { return pass_count_; }
 
  private:
@@ -127,13 +99,13 @@ class ShadowVolumes::Impl {
   void create_objects();
   void delete_objects();
   void resize(int width, int height);
-  glm::dvec3 begin(const VolumeCamera& camera, glm::dvec3 direction_to_sun);
+  glm::dvec3 begin(const VolumeCamera& camera, glm::dvec3 direction_to_sun, const VolumeRange& range);
   void draw_visible_depth(const VolumeCamera& camera);
   void upload(GLuint array, GLuint buffer, const std::vector<glm::vec3>& vertices, glm::dvec3 sun, GLenum use) const;
   void check_errors();
   bool light_reaches_picture(std::span<const glm::vec3> corners, glm::dvec3 direction_to_sun) const;
-  std::vector<std::uint8_t> count_crossings(const VolumeTriangles& volume);
-  std::vector<std::uint8_t> read_stencil() const;
+  std::vector<std::uint8_t> count_crossings(const VolumeTriangles& volume, const VolumeRange& range);
+  std::vector<std::uint8_t> read_stencil(const VolumeRange& range) const;
   void draw(std::size_t first, std::size_t count) const;
 
   GlContext& context_;
@@ -200,7 +172,7 @@ ShadowVolumes::Impl::~Impl() {
 }
 
 void ShadowVolumes::Impl::create_objects() {
-  program_ = link_program(gl_);
+  program_ = link_volume_program(gl_);
   clip_from_world_location_ = gl_.GetUniformLocation(program_, "clip_from_world");
 
   gl_.GenVertexArrays(1, &other_array_);
@@ -296,7 +268,8 @@ bool ShadowVolumes::Impl::light_reaches_picture(std::span<const glm::vec3> corne
 /// (front). Depth clamp keeps the faces that reach beyond the farthest depth; what is nearer than the nearest surface
 /// hides behind none. A cap at the very depth of the visible surface fails the test "less" and so counts as beyond: a
 /// lit surface does not shadow itself. [Everitt & Kilgard 2002]
-std::vector<std::uint8_t> ShadowVolumes::Impl::count_crossings(const VolumeTriangles& volume) {
+std::vector<std::uint8_t> ShadowVolumes::Impl::count_crossings(const VolumeTriangles& volume,
+                                                               const VolumeRange& range) {
   gl_.DepthMask(GL_FALSE);
   gl_.Enable(GL_STENCIL_TEST);
   gl_.Enable(GL_POLYGON_OFFSET_FILL);
@@ -315,14 +288,16 @@ std::vector<std::uint8_t> ShadowVolumes::Impl::count_crossings(const VolumeTrian
   gl_.FrontFace(GL_CCW);
   draw(volume.clockwise_count, volume.indices.size() - volume.clockwise_count);
   ++pass_count_;
-  return read_stencil();
+  return read_stencil(range);
 }
 
-std::vector<std::uint8_t> ShadowVolumes::Impl::read_stencil() const {
-  const std::size_t width = static_cast<std::size_t>(camera_.width), height = static_cast<std::size_t>(camera_.height);
+std::vector<std::uint8_t> ShadowVolumes::Impl::read_stencil(const VolumeRange& range) const {
+  const auto width = static_cast<std::size_t>(range.right - range.left),
+             height = static_cast<std::size_t>(range.bottom - range.top);
   std::vector<std::uint8_t> stencil(width * height);
   gl_.PixelStorei(GL_PACK_ALIGNMENT, 1);
-  gl_.ReadPixels(0, 0, camera_.width, camera_.height, GL_STENCIL_INDEX, GL_UNSIGNED_BYTE, stencil.data());
+  gl_.ReadPixels(range.left, camera_.height - range.bottom, range.right - range.left, range.bottom - range.top,
+                 GL_STENCIL_INDEX, GL_UNSIGNED_BYTE, stencil.data());
   for (std::size_t y = 0; y < height / 2; ++y) {  // OpenGL's first row is the bottom one
     const auto row = [&](std::size_t i) { return stencil.begin() + static_cast<std::ptrdiff_t>(i * width); };
     std::swap_ranges(row(y), row(y + 1), row(height - 1 - y));
@@ -337,8 +312,10 @@ void ShadowVolumes::Impl::draw(std::size_t first, std::size_t count) const {
 }
 
 // Makes the context ready to count, with the depth of what the camera sees; gives the unit direction to the sun.
-glm::dvec3 ShadowVolumes::Impl::begin(const VolumeCamera& camera, glm::dvec3 direction_to_sun) {
+glm::dvec3 ShadowVolumes::Impl::begin(const VolumeCamera& camera, glm::dvec3 direction_to_sun,
+                                      const VolumeRange& range) {
   check_camera(camera);
+  check_range(range, camera);
   if (!is_finite(direction_to_sun) || !(glm::length(direction_to_sun) > 0)) {
     throw InputError("Shadow volumes: the direction to the sun is not a direction");
   }
@@ -347,6 +324,7 @@ glm::dvec3 ShadowVolumes::Impl::begin(const VolumeCamera& camera, glm::dvec3 dir
   gl_.Viewport(0, 0, camera.width, camera.height);
   gl_.UseProgram(program_);
   gl_.BindVertexArray(vertex_array_);
+  gl_.Disable(GL_SCISSOR_TEST);
   gl_.Enable(GL_DEPTH_TEST);
   gl_.DepthFunc(GL_LESS);
   gl_.Enable(GL_DEPTH_CLAMP);
@@ -360,6 +338,8 @@ glm::dvec3 ShadowVolumes::Impl::begin(const VolumeCamera& camera, glm::dvec3 dir
     draw_visible_depth(camera);
     camera_ = camera;
   }
+  gl_.Enable(GL_SCISSOR_TEST);
+  gl_.Scissor(range.left, camera.height - range.bottom, range.right - range.left, range.bottom - range.top);
   return glm::normalize(direction_to_sun);
 }
 
@@ -372,37 +352,39 @@ void ShadowVolumes::Impl::check_errors() {
 
 std::vector<std::uint8_t> ShadowVolumes::Impl::count(const VolumeCamera& camera, glm::dvec3 direction_to_source,
                                                      const std::vector<glm::vec3>& vertices,
-                                                     const ShadowCasters& casters) {
+                                                     const ShadowCasters& casters, const VolumeRange& range) {
   const GlContext::Scope scope(context_);
-  const glm::dvec3 source = begin(camera, direction_to_source);
-  const VolumeTriangles volume = casters.volume(source, static_cast<std::uint32_t>(vertices.size()));
+  const glm::dvec3 source = begin(camera, direction_to_source, range);
+  const VolumeTriangles volume =
+      casters.volume(source, static_cast<std::uint32_t>(vertices.size()), vertices, ShadedPoints(source, range.boxes));
   if (volume.empty() || !light_reaches_picture(vertices, source))
-    return std::vector<std::uint8_t>(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height),
-                                     0);
+    return std::vector<std::uint8_t>(pixel_count(range), 0);
   upload(other_array_, other_buffer_, vertices, source, GL_STREAM_DRAW);
-  std::vector<std::uint8_t> counted = count_crossings(volume);
+  std::vector<std::uint8_t> counted = count_crossings(volume, range);
   check_errors();
   return counted;
 }
 
-BeamMask ShadowVolumes::Impl::render(const VolumeCamera& camera, glm::dvec3 direction_to_sun) {
+BeamMask ShadowVolumes::Impl::render(const VolumeCamera& camera, glm::dvec3 direction_to_sun,
+                                     const VolumeRange& range) {
   const GlContext::Scope scope(context_);
-  const glm::dvec3 sun = begin(camera, direction_to_sun);
-  const std::size_t pixel_count = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  const glm::dvec3 sun = begin(camera, direction_to_sun, range);
   const glm::vec4 infinity(-sun, 0);
   gl_.BindBuffer(GL_ARRAY_BUFFER, vertex_buffer_);
   gl_.BufferSubData(GL_ARRAY_BUFFER, static_cast<GLintptr>(vertices_.size() * sizeof(glm::vec4)), sizeof(glm::vec4),
                     glm::value_ptr(infinity));
 
+  const ShadedPoints points(sun, range.boxes);
   const auto count = [&](const ShadowCasters& casters) {
-    const VolumeTriangles volume = casters.volume(sun, static_cast<std::uint32_t>(vertices_.size()));
-    return volume.empty() ? std::vector<std::uint8_t>(pixel_count, 0) : count_crossings(volume);
+    const VolumeTriangles volume = casters.volume(sun, static_cast<std::uint32_t>(vertices_.size()), vertices_, points);
+    return volume.empty() ? std::vector<std::uint8_t>(pixel_count(range), 0) : count_crossings(volume, range);
   };
-  BeamMask mask{camera.width, camera.height, count(*opaque_casters_), {}};
+  BeamMask mask{range.right - range.left, range.bottom - range.top, count(*opaque_casters_), {}};
   for (std::uint8_t& pixel : mask.shadowed) pixel = pixel != 0;
   for (const Opening& opening : openings_) {
-    mask.crossings.push_back(light_reaches_picture(opening.corners, sun) ? count(opening.casters)
-                                                                         : std::vector<std::uint8_t>(pixel_count, 0));
+    mask.crossings.push_back(light_reaches_picture(opening.corners, sun)
+                                 ? count(opening.casters)
+                                 : std::vector<std::uint8_t>(pixel_count(range), 0));
   }
   check_errors();
   return mask;
@@ -416,12 +398,17 @@ ShadowVolumes::ShadowVolumes(GlContext& context, std::span<const glm::vec3> vert
 ShadowVolumes::~ShadowVolumes() = default;
 
 BeamMask ShadowVolumes::render(const VolumeCamera& camera, glm::dvec3 direction_to_sun) {
-  return impl_->render(camera, direction_to_sun);
+  check_camera(camera);
+  return render(camera, direction_to_sun, {0, 0, camera.width, camera.height, {}});
+}
+
+BeamMask ShadowVolumes::render(const VolumeCamera& camera, glm::dvec3 direction_to_sun, const VolumeRange& range) {
+  return impl_->render(camera, direction_to_sun, range);
 }
 
 std::vector<std::uint8_t> ShadowVolumes::count(const VolumeCamera& camera, glm::dvec3 direction_to_source,
-                                               const VolumeCasters& casters) {
-  return impl_->count(camera, direction_to_source, casters.prepared_->vertices, casters.prepared_->casters);
+                                               const VolumeCasters& casters, const VolumeRange& range) {
+  return impl_->count(camera, direction_to_source, casters.prepared_->vertices, casters.prepared_->casters, range);
 }
 
 int ShadowVolumes::pass_count() const {

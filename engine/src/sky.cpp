@@ -84,12 +84,20 @@ std::vector<Beam> Condition::beams_at_points() const {
   return at_points;
 }
 
+glm::vec2 Condition::place_in_pictures(glm::vec3 direction) {
+  return {azimuth_of(direction) / kTwoPi, std::acos(std::min(direction.z, 1.f)) / (kTwoPi / 4)};
+}
+
 glm::vec3 Condition::seen(glm::vec3 direction, const SkyBinIndex& bins) const {
+  const bool is_in_picture = direction.z >= 0 && !picture.empty();
+  return seen(direction, is_in_picture ? place_in_pictures(direction) : glm::vec2(0), bins);
+}
+
+glm::vec3 Condition::seen(glm::vec3 direction, glm::vec2 place, const SkyBinIndex& bins) const {
   if (direction.z < 0) return ground_luminance;
   if (picture.empty()) return sky_luminance[bins(direction)] * sky_colour;
-  const float theta = std::acos(std::min(direction.z, 1.f));
-  const float y = theta / (kTwoPi / 4) * static_cast<float>(picture_height - 1);
-  const float x = azimuth_of(direction) / kTwoPi * static_cast<float>(picture_width) - 0.5f;
+  const float y = place.y * static_cast<float>(picture_height - 1);
+  const float x = place.x * static_cast<float>(picture_width) - 0.5f;
   const int y0 = std::min(static_cast<int>(y), picture_height - 2);
   const int x0 = static_cast<int>(std::floor(x));
   const float fy = y - static_cast<float>(y0), fx = x - static_cast<float>(x0);

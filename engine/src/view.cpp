@@ -32,8 +32,26 @@ CameraRays::CameraRays(const View& view) : width_(view.width), height_(view.heig
 }
 
 glm::vec3 CameraRays::direction(glm::vec2 pixel) const {
-  return glm::vec3(
-      glm::normalize(forward_ + (2.0 * pixel.x / width_ - 1.0) * right_ + (2.0 * pixel.y / height_ - 1.0) * down_));
+  glm::vec3 result;
+  directions(glm::vec2(0), {&pixel, 1}, &result.x, &result.y, &result.z);
+  return result;
+}
+
+// Channel by channel, so that the compiler takes several places at once.
+void CameraRays::directions(glm::vec2 corner, std::span<const glm::vec2> places, float* x, float* y, float* z) const {
+  const glm::dvec3 forward = forward_, right = right_, down = down_;
+  const double width = width_, height = height_;
+  const float* place = places.empty() ? nullptr : &places[0].x;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const double across = 2.0 * static_cast<double>(corner.x + place[2 * i]) / width - 1.0,
+                 along = 2.0 * static_cast<double>(corner.y + place[2 * i + 1]) / height - 1.0;
+    const double dx = forward.x + across * right.x + along * down.x, dy = forward.y + across * right.y + along * down.y,
+                 dz = forward.z + across * right.z + along * down.z;
+    const double scale = 1.0 / std::sqrt(dx * dx + dy * dy + dz * dz);
+    x[i] = static_cast<float>(dx * scale);
+    y[i] = static_cast<float>(dy * scale);
+    z[i] = static_cast<float>(dz * scale);
+  }
 }
 
 }  // namespace transom

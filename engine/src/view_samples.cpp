@@ -1,88 +1,22 @@
 #include "transom/view_samples.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
 #include <utility>
 
 #include "transom/parallel.h"
+#include "view_rays.h"
 
 namespace transom {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
-constexpr int kMaximumCrossings = 16;   // openings looked through, one behind another
 constexpr float kSameNormal = 0.9995f;  // cosine between normals of one smooth or flat surface
-
-// A surface at the end of a ray from the camera, or a pane on the way.
-struct Seen {
-  Hit hit;              // face -1: the sky or the ground
-  float through = 1;    // transmittance of the openings in front of it
-  int crossings = 0;    // openings in front of it
-  glm::vec3 direction;  // of the ray
-  bool ends_at_panel = false;
-  int panel_bin = -1;  // by which the panel's own light is seen; -1: none, from outdoors
-};
-
-struct SeenPane {
-  std::size_t ray;
-  Seen seen;
-};
-
-// From the camera to the first opaque surface, through any number of openings.
-class Tracer {
- public:
-  Tracer(const Engine& engine, const View& view)
-      : engine_(engine), camera_(view), origin_(view.position - engine.faces().origin) {}
-
-  void trace(std::span<const glm::vec2> pixels, std::vector<Seen>& seen, std::vector<SeenPane>& panes) {
-    seen.assign(pixels.size(), {});
-    panes.clear();
-    active_.resize(pixels.size());
-    rays_.resize(pixels.size());
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-      active_[i] = i;
-      rays_[i] = {origin_, camera_.direction(pixels[i])};
-      seen[i].direction = rays_[i].direction;
-    }
-    for (int crossing = 0; crossing <= kMaximumCrossings && !active_.empty(); ++crossing) {
-      hits_.resize(active_.size());
-      engine_.rays().intersect(RayScene::What::kAll, rays_, hits_, RayScene::Order::kCoherent);
-      std::size_t kept = 0;
-      for (std::size_t k = 0; k < active_.size(); ++k) {
-        Seen& here = seen[active_[k]];
-        here.hit = hits_[k];
-        if (here.hit.face < 0) continue;
-        const Face& face = engine_.faces().faces[here.hit.face];
-        const int opening = engine_.scene().materials[face.material].opening;
-        if (opening < 0) continue;
-        if (engine_.reflectance(here.hit.face, here.hit.side) != glm::vec3(0)) panes.push_back({active_[k], here});
-        if (const Panel* panel = engine_.panels().at(here.hit.face)) {  // nothing is seen through it
-          here.panel_bin = here.hit.side == 1 ? engine_.panels().bin(*panel, -here.direction) : -1;
-          here.ends_at_panel = true;
-          continue;
-        }
-        here.through *= engine_.scene().openings[opening].transmittance_at(glm::dot(face.normal, here.direction));
-        ++here.crossings;
-        rays_[kept] = rays_[k];
-        rays_[kept].t_near = hits_[k].t + engine_.faces().ray_offset();
-        active_[kept++] = active_[k];
-      }
-      active_.resize(kept);
-      rays_.resize(kept);
-    }
-    for (const std::size_t i : active_) seen[i].through = 0;  // too many panes: dark
-  }
-
- private:
-  const Engine& engine_;
-  const CameraRays camera_;
-  const glm::vec3 origin_;
-  std::vector<std::size_t> active_;
-  std::vector<Ray> rays_;
-  std::vector<Hit> hits_;
-};
+constexpr float kSamePlane = 1e-4f;     // of the scene's extent, between planes of one flat surface
+constexpr std::size_t kGroupSize = 64;  // points of a group: few enough to lie close together, several packets of rays
 
 BeamPoint beam_point(const Engine& engine, const Seen& seen, float weight, int pixel, int sample) {
   const Hit& hit = seen.hit;
@@ -96,103 +30,37 @@ BeamPoint beam_point(const Engine& engine, const Seen& seen, float weight, int p
           sample};
 }
 
-// Names what a ray has met: a side of a face, the sky or the ground, and how many openings are in front of it.
-std::int64_t name_of(const Seen& seen) {
-  const std::int64_t surface =
-      seen.hit.face >= 0 ? 2 * std::int64_t{seen.hit.face} + seen.hit.side + 2 : (seen.direction.z < 0 ? 1 : 0);
-  return surface * (kMaximumCrossings + 2) + seen.crossings;
+// Points of one surface, from number `first` on.
+BeamGroup group_of(std::span<const BeamPoint> points, std::size_t first) {
+  BeamGroup group{points[0].surface, first, first + points.size(), points[0].position, points[0].position};
+  for (const BeamPoint& point : points) {
+    group.low = glm::min(group.low, point.position);
+    group.high = glm::max(group.high, point.position);
+  }
+  return group;
 }
 
-// A sample of a pixel.
-struct Sample {
-  Seen seen;
-  int place;  // BeamPoint::sample
-};
-
-// All that is alike of what a pixel sees.
-struct PartOfPixel {
-  std::vector<Sample> samples;
-  std::vector<int> places;  // of the finer grid, at which it is seen
-};
-
-// Tells apart what the samples of a pixel see, by two grids: each part has the samples of the coarser one, or of the
-// finer one where the coarser has missed it, and covers as much of the pixel as the finer one says.
-class PixelParts {
- public:
-  explicit PixelParts(int samples_per_axis) : s_(samples_per_axis) {}
-
-  const std::vector<PartOfPixel>& tell_apart(const std::vector<Seen>& coarse, const std::vector<Seen>& finer) {
-    parts_.clear();
-    names_.clear();
-    part_at_.clear();
-    for (std::size_t k = 0; k < finer.size(); ++k) {
-      const std::size_t part = part_of(name_of(finer[k]));
-      if (part == parts_.size()) {
-        names_.push_back(name_of(finer[k]));
-        parts_.emplace_back();
-      }
-      parts_[part].places.push_back(static_cast<int>(k));
-      part_at_.push_back(part);
-    }
-    for (std::size_t k = 0; k < coarse.size(); ++k) {
-      const std::size_t part = part_of(name_of(coarse[k]));
-      if (part < parts_.size()) parts_[part].samples.push_back({coarse[k], place_in_masks(part, static_cast<int>(k))});
-    }
-    for (std::size_t part = 0; part < parts_.size(); ++part)
-      if (parts_[part].samples.empty())
-        parts_[part].samples.push_back(
-            {finer[static_cast<std::size_t>(parts_[part].places.front())], place_in_masks(part, 0)});
-    return parts_;
+// Groups points that follow each other on one surface; the first of them has the number `first`.
+void add_groups(std::span<const BeamPoint> points, std::size_t first, std::vector<BeamGroup>& groups) {
+  for (std::size_t begin = 0, end = 0; begin < points.size(); begin = end) {
+    end = begin + 1;
+    if (points[begin].surface < 0) continue;
+    while (end < std::min(points.size(), begin + kGroupSize) && points[end].surface == points[begin].surface) ++end;
+    groups.push_back(group_of(points.subspan(begin, end - begin), first + begin));
   }
-
- private:
-  std::size_t part_of(std::int64_t name) const {
-    return static_cast<std::size_t>(std::find(names_.begin(), names_.end(), name) - names_.begin());
-  }
-  // A place of the coarser grid around which only this part is seen, so that the middle of its square, where masks are
-  // drawn, sees it too: the own one, or another.
-  int place_in_masks(std::size_t part, int own) const {
-    const auto is_whole = [&](int place) {
-      for (int j = 0; j < kFiner; ++j)
-        for (int i = 0; i < kFiner; ++i)
-          if (part_at_[static_cast<std::size_t>((place / s_ * kFiner + j) * kFiner * s_ + place % s_ * kFiner + i)] !=
-              part)
-            return false;
-      return true;
-    };
-    if (is_whole(own)) return own;
-    for (int place = 0; place < s_ * s_; ++place)
-      if (is_whole(place)) return place;
-    return BeamPoint::kNotInMasks;
-  }
-
-  int s_;
-  std::vector<std::int64_t> names_;
-  std::vector<PartOfPixel> parts_;
-  std::vector<std::size_t> part_at_;  // by place of the finer grid
-};
-
-// What one row of the picture found, in the order of its pixels.
-struct RowOfPixels {
-  std::vector<BeamPoint> fine, on_panes;
-  std::vector<ViewSamples::Part> parts;
-  std::vector<int> places;
-  std::vector<std::vector<Share>> smooth;
-  std::vector<ViewSamples::Constant> constant;
-  std::vector<ViewSamples::Outlook> outlooks;
-  std::vector<ViewSamples::SeenPanel> panels;
-};
+}
 
 // Adds a sample to its pixel; gives the point at which beams are tested.
 BeamPoint add_sample(const Engine& engine, const Seen& seen, float weight, int pixel, int sample,
-                     std::vector<Share>& smooth, RowOfPixels& row) {
+                     std::vector<Share>& smooth, ViewSamples::Row& row) {
   const BeamPoint point = beam_point(engine, seen, weight, pixel, sample);
   if (seen.ends_at_panel) {
     if (seen.panel_bin >= 0) row.panels.push_back({pixel, weight * seen.through, seen.panel_bin});
     return point;
   }
   if (point.surface < 0) {
-    row.outlooks.push_back({pixel, weight * seen.through, seen.direction});
+    row.outlooks.push_back(
+        {pixel, weight * seen.through, seen.direction, Condition::place_in_pictures(seen.direction)});
     return point;
   }
   const NodeShares shares = engine.shown_at(seen.hit.face, seen.hit.side, seen.hit.st, point.position);
@@ -208,6 +76,198 @@ BeamPoint add_sample(const Engine& engine, const Seen& seen, float weight, int p
   return point;
 }
 
+// What a picture sees at its pixels' centres, and where edges are beside them.
+class CentreRays {
+ public:
+  CentreRays(const Engine& engine, const View& view);
+
+  const Seen& at(std::size_t pixel) const { return seen_[pixel]; }
+  /// Panes in front of a row, pixel by pixel; `ray` is the column.
+  const std::vector<SeenPane>& panes(std::size_t row) const { return panes_[row]; }
+  /// Whether two rays meet different surfaces.
+  bool differ(const Seen& a, const Seen& b) const;
+  /// Whether a pixel or one of the eight around it sees another surface than the pixel does.
+  bool is_beside_edge(int x, int y) const;
+
+ private:
+  static constexpr std::uint8_t kRight = 1, kDownLeft = 2, kDown = 4, kDownRight = 8;
+
+  const Engine& engine_;
+  int width_, height_;
+  float same_plane_;
+  std::vector<Seen> seen_;
+  std::vector<std::vector<SeenPane>> panes_;
+  std::vector<std::uint8_t> differs_from_;  // by pixel: which of the four neighbours after it see another surface
+};
+
+CentreRays::CentreRays(const Engine& engine, const View& view)
+    : engine_(engine),
+      width_(view.width),
+      height_(view.height),
+      same_plane_(kSamePlane * engine.faces().extent),
+      seen_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_)),
+      panes_(static_cast<std::size_t>(height_)),
+      differs_from_(seen_.size()) {
+  const auto row_size = static_cast<std::size_t>(width_);
+  std::vector<glm::vec2> middles;
+  for (int x = 0; x < width_; ++x) middles.emplace_back(static_cast<float>(x) + 0.5f, 0.5f);
+  parallel_indices(panes_.size(), 2, [&](std::size_t y) {
+    CameraTracer tracer(engine, view);
+    tracer.trace({0, y}, middles, {&seen_[y * row_size], row_size}, panes_[y]);
+    std::stable_sort(panes_[y].begin(), panes_[y].end(),
+                     [](const SeenPane& a, const SeenPane& b) { return a.ray < b.ray; });
+  });
+  parallel_indices(panes_.size(), 4, [&](std::size_t y) {
+    for (std::size_t x = 0; x < row_size; ++x) {
+      const std::size_t p = y * row_size + x;
+      const bool has_left = x > 0, has_right = x + 1 < row_size, has_below = y + 1 < panes_.size();
+      int bits = 0;
+      if (has_right && differ(seen_[p], seen_[p + 1])) bits |= kRight;
+      if (has_below && has_left && differ(seen_[p], seen_[p + row_size - 1])) bits |= kDownLeft;
+      if (has_below && differ(seen_[p], seen_[p + row_size])) bits |= kDown;
+      if (has_below && has_right && differ(seen_[p], seen_[p + row_size + 1])) bits |= kDownRight;
+      differs_from_[p] = static_cast<std::uint8_t>(bits);
+    }
+  });
+}
+
+bool CentreRays::differ(const Seen& a, const Seen& b) const {
+  if (a.crossings != b.crossings || (a.hit.face < 0) != (b.hit.face < 0)) return true;
+  if (a.hit.face < 0) return (a.direction.z < 0) != (b.direction.z < 0);
+  if (a.hit.face == b.hit.face) return a.hit.side != b.hit.side;
+  const Face &f = engine_.faces().faces[a.hit.face], &g = engine_.faces().faces[b.hit.face];
+  const float sense = a.hit.side == b.hit.side ? 1.f : -1.f, cosine = glm::dot(f.normal, g.normal) * sense;
+  return cosine < kSameNormal ||
+         std::abs(glm::dot(f.normal, f.corner[0]) - sense * glm::dot(g.normal, g.corner[0])) > same_plane_;
+}
+
+bool CentreRays::is_beside_edge(int x, int y) const {
+  const std::uint8_t* own =
+      &differs_from_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
+  if (*own || (x > 0 && (own[-1] & kRight))) return true;
+  if (y == 0) return false;
+  const std::uint8_t* above = own - width_;
+  return (*above & kDown) || (x > 0 && (above[-1] & kDownRight)) || (x + 1 < width_ && (above[1] & kDownLeft));
+}
+
+// Sums the weights of shares of the same node.
+void merge_few(std::vector<Share>& shares) {
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < shares.size(); ++k) {
+    const Share share = shares[k];
+    std::size_t same = 0;
+    while (same < kept && shares[same].index != share.index) ++same;
+    if (same < kept)
+      shares[same].weight += share.weight;
+    else
+      shares[kept++] = share;
+  }
+  shares.resize(kept);
+}
+
+// The samples of the pixels of a row, one pixel after the other.
+class RowSampler {
+ public:
+  RowSampler(const Engine& engine, const View& view, int samples_per_axis)
+      : engine_(engine),
+        camera_(view),
+        eye_(view.position - engine.faces().origin),
+        tracer_(engine, view),
+        s_(samples_per_axis),
+        places_(all_places(s_)),
+        finer_places_(all_places(kFiner * s_)),
+        found_(places_.size()),
+        finer_(finer_places_.size()),
+        parts_(s_) {}
+
+  void sample(const CentreRays& middles, std::size_t y, std::span<char> has_edge, std::span<BeamPoint> centre,
+              ViewSamples::Row& row);
+
+ private:
+  bool finds_edge(const Seen& middle, const CentreRays& middles, glm::vec2 corner);
+  BeamPoint whole(const Seen& seen, glm::vec2 corner, int pixel, ViewSamples::Row& row);
+  void add_parts(glm::vec2 corner, int pixel, ViewSamples::Row& row);
+
+  const Engine& engine_;
+  const CameraRays camera_;
+  const glm::vec3 eye_;
+  CameraTracer tracer_;
+  int s_;
+  const std::vector<glm::vec2> places_, finer_places_;
+  std::vector<Seen> found_, finer_;
+  std::vector<SeenPane> panes_, finer_panes_;
+  PixelParts parts_;
+  std::vector<Share> shares_;  // of the pixel
+};
+
+// Whether the pixel itself, at its samples, sees another surface than its middle.
+bool RowSampler::finds_edge(const Seen& middle, const CentreRays& middles, glm::vec2 corner) {
+  tracer_.trace(corner, places_, found_, panes_);
+  return std::any_of(found_.begin(), found_.end(), [&](const Seen& other) { return middles.differ(middle, other); });
+}
+
+// One surface: light between nodes at the middle of the pixel, beams at its scattered place.
+BeamPoint RowSampler::whole(const Seen& seen, glm::vec2 corner, int pixel, ViewSamples::Row& row) {
+  BeamPoint point = add_sample(engine_, seen, 1, pixel, BeamPoint::kCentre, shares_, row);
+  if (s_ > 1 && point.surface >= 0) {
+    const glm::vec2 place = scattered_place(static_cast<int>(corner.x), static_cast<int>(corner.y));
+    places_on_plane(camera_, eye_, corner, {&place, 1}, point.position, engine_.faces().faces[seen.hit.face].normal,
+                    {&point.position, 1});
+  }
+  return point;
+}
+
+void RowSampler::add_parts(glm::vec2 corner, int pixel, ViewSamples::Row& row) {
+  tracer_.trace(corner, finer_places_, finer_, finer_panes_);
+  for (const PixelParts::Part& part : parts_.tell_apart(found_, finer_)) {
+    const float share = static_cast<float>(part.places.size()) / static_cast<float>(finer_.size()),
+                weight = share / static_cast<float>(part.samples.size());
+    const std::size_t first_point = row.fine.size();
+    for (const PixelParts::Sample& sample : part.samples) {
+      const BeamPoint point = add_sample(engine_, *sample.seen, weight, pixel, sample.place, shares_, row);
+      if (point.surface >= 0) row.fine.push_back(point);
+    }
+    if (row.fine.size() == first_point) continue;
+    row.parts.push_back({group_of({&row.fine[first_point], row.fine.size() - first_point}, first_point),
+                         row.places.size(), row.places.size() + part.places.size()});
+    row.places.insert(row.places.end(), part.places.begin(), part.places.end());
+  }
+  const float weight = 1 / static_cast<float>(s_ * s_);
+  for (const SeenPane& pane : panes_)
+    row.on_panes.push_back(add_sample(engine_, pane.seen, weight, pixel, static_cast<int>(pane.ray), shares_, row));
+}
+
+void RowSampler::sample(const CentreRays& middles, std::size_t y, std::span<char> has_edge, std::span<BeamPoint> centre,
+                        ViewSamples::Row& row) {
+  const std::size_t width = centre.size();
+  row.smooth.begin.reserve(width + 1);
+  row.smooth.entries.reserve(4 * width);
+  auto pane = middles.panes(y).begin();
+  for (std::size_t x = 0; x < width; ++x) {
+    const std::size_t p = y * width + x;
+    const int pixel = static_cast<int>(p);
+    const glm::vec2 corner(x, y);
+    const Seen& middle = middles.at(p);
+    const auto first_pane = std::exchange(
+        pane, std::find_if(pane, middles.panes(y).end(), [x](const SeenPane& other) { return other.ray != x; }));
+    shares_.clear();
+    has_edge[x] = s_ > 1 && middles.is_beside_edge(static_cast<int>(x), static_cast<int>(y)) &&
+                  finds_edge(middle, middles, corner);
+    if (has_edge[x]) {
+      centre[x] = beam_point(engine_, middle, 1, pixel, BeamPoint::kCentre);
+      add_parts(corner, pixel, row);
+    } else {
+      centre[x] = whole(middle, corner, pixel, row);
+      for (auto other = first_pane; other != pane; ++other)
+        row.on_panes.push_back(add_sample(engine_, other->seen, 1, pixel, BeamPoint::kCentre, shares_, row));
+    }
+    merge_few(shares_);
+    row.smooth.append(shares_);
+  }
+  add_groups(centre, y * width, row.centre_groups);
+  add_groups(row.on_panes, 0, row.pane_groups);
+}
+
 }  // namespace
 
 glm::vec2 sample_place(int sample, int samples_per_axis) {
@@ -219,133 +279,53 @@ glm::vec2 sample_place(int sample, int samples_per_axis) {
   return {within(column, row), within(row, samples_per_axis - 1 - column)};
 }
 
+std::vector<glm::vec2> all_places(int samples_per_axis) {
+  std::vector<glm::vec2> places;
+  for (int k = 0; k < samples_per_axis * samples_per_axis; ++k) places.push_back(sample_place(k, samples_per_axis));
+  return places;
+}
+
 glm::vec2 scattered_place(int x, int y) {
   constexpr int kPeriod = 3;
   return sample_place(x % kPeriod * kPeriod + y % kPeriod, kPeriod);
 }
 
-glm::vec3 place_on_plane(const CameraRays& camera, glm::vec3 eye, glm::vec2 pixel, glm::vec3 of_plane,
-                         glm::vec3 normal) {
-  const glm::vec3 direction = camera.direction(pixel);
-  return eye + direction * (glm::dot(of_plane - eye, normal) / glm::dot(direction, normal));
+void places_on_plane(const CameraRays& camera, glm::vec3 eye, glm::vec2 corner, std::span<const glm::vec2> places,
+                     glm::vec3 of_plane, glm::vec3 normal, std::span<glm::vec3> met) {
+  constexpr std::size_t kChunk = 64;
+  std::array<float, kChunk> x, y, z;
+  const float distance = glm::dot(of_plane - eye, normal);
+  for (std::size_t begin = 0; begin < places.size(); begin += kChunk) {
+    const std::size_t size = std::min(kChunk, places.size() - begin);
+    camera.directions(corner, places.subspan(begin, size), x.data(), y.data(), z.data());
+    for (std::size_t i = 0; i < size; ++i) {
+      const glm::vec3 direction(x[i], y[i], z[i]);
+      met[begin + i] = eye + direction * (distance / glm::dot(direction, normal));
+    }
+  }
 }
 
 ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_per_axis)
     : view(camera), edge_samples(std::max(1, samples_per_axis)) {
-  const int width = view.width, height = view.height, s = edge_samples;
-  const auto row_count = static_cast<std::size_t>(height), row_size = static_cast<std::size_t>(width);
-  const std::size_t pixel_count = row_count * row_size;
-  std::vector<Seen> seen(pixel_count);
-  std::vector<std::vector<SeenPane>> panes(row_count);
+  const auto row_count = static_cast<std::size_t>(view.height), row_size = static_cast<std::size_t>(view.width);
+  const CentreRays middles(engine, view);
+  has_edge.resize(row_count * row_size);
+  centre.resize(row_count * row_size);
+  rows.resize(row_count);
   parallel_indices(row_count, 1, [&](std::size_t y) {
-    Tracer tracer(engine, view);
-    std::vector<glm::vec2> pixels(row_size);
-    for (std::size_t x = 0; x < row_size; ++x) pixels[x] = glm::vec2(x, y) + 0.5f;
-    std::vector<Seen> found;
-    tracer.trace(pixels, found, panes[y]);
-    std::copy(found.begin(), found.end(), seen.begin() + static_cast<std::ptrdiff_t>(y * row_size));
+    RowSampler(engine, view, edge_samples)
+        .sample(middles, y, {&has_edge[y * row_size], row_size}, {&centre[y * row_size], row_size}, rows[y]);
   });
-
-  // Edges: where neighbours see different surfaces.
-  const float same_plane = 1e-4f * engine.faces().extent;
-  const auto differ = [&](const Seen& a, const Seen& b) {
-    if (a.crossings != b.crossings || (a.hit.face < 0) != (b.hit.face < 0)) return true;
-    if (a.hit.face < 0) return (a.direction.z < 0) != (b.direction.z < 0);
-    if (a.hit.face == b.hit.face) return a.hit.side != b.hit.side;
-    const Face &f = engine.faces().faces[a.hit.face], &g = engine.faces().faces[b.hit.face];
-    const float cosine = glm::dot(f.normal, g.normal) * (a.hit.side == b.hit.side ? 1.f : -1.f);
-    return cosine < kSameNormal ||
-           std::abs(glm::dot(f.normal, f.corner[0]) -
-                    (a.hit.side == b.hit.side ? 1.f : -1.f) * glm::dot(g.normal, g.corner[0])) > same_plane;
+  std::vector<char> is_listed(2 * engine.faces().faces.size(), 0);
+  const auto list_surfaces = [&](const auto& groups) {
+    for (const BeamGroup& group : groups)
+      if (!std::exchange(is_listed[static_cast<std::size_t>(group.surface)], 1)) surfaces.push_back(group.surface);
   };
-  has_edge.assign(pixel_count, 0);
-  if (s > 1)
-    parallel_indices(row_count, 4, [&](std::size_t row) {
-      const int y = static_cast<int>(row);
-      for (int x = 0; x < width; ++x)
-        for (int dy = -1; dy <= 1; ++dy)
-          for (int dx = -1; dx <= 1; ++dx)
-            if (x + dx >= 0 && x + dx < width && y + dy >= 0 && y + dy < height)
-              has_edge[y * width + x] |= differ(seen[y * width + x], seen[(y + dy) * width + x + dx]);
-    });
-
-  // Samples, row by row of the picture.
-  const CameraRays camera_rays(view);
-  const glm::vec3 eye(view.position - engine.faces().origin);
-  centre.resize(pixel_count);
-  std::vector<RowOfPixels> rows(row_count);
-  parallel_indices(row_count, 1, [&](std::size_t y) {
-    RowOfPixels& row = rows[y];
-    row.smooth.resize(row_size);
-    Tracer tracer(engine, view);
-    std::vector<glm::vec2> points;
-    std::vector<Seen> found, finer;
-    std::vector<SeenPane> panes_found, finer_panes;
-    PixelParts pixel_parts(s);
-    const auto trace_grid = [&](std::size_t x, int of_axis, std::vector<Seen>& met, std::vector<SeenPane>& panes_met) {
-      points.clear();
-      for (int k = 0; k < of_axis * of_axis; ++k) points.push_back(glm::vec2(x, y) + sample_place(k, of_axis));
-      tracer.trace(points, met, panes_met);
-    };
-    for (std::size_t x = 0; x < row_size; ++x) {
-      const std::size_t p = y * row_size + x;
-      const int pixel = static_cast<int>(p);
-      if (has_edge[p]) {  // beside the pixel, or in it
-        trace_grid(x, s, found, panes_found);
-        has_edge[p] =
-            std::any_of(found.begin(), found.end(), [&](const Seen& other) { return differ(seen[p], other); });
-      }
-      if (!has_edge[p]) {
-        centre[p] = add_sample(engine, seen[p], 1, pixel, BeamPoint::kCentre, row.smooth[x], row);
-        if (s > 1 && centre[p].surface >= 0)
-          centre[p].position = place_on_plane(
-              camera_rays, eye, glm::vec2(x, y) + scattered_place(static_cast<int>(x), static_cast<int>(y)),
-              centre[p].position, engine.faces().faces[seen[p].hit.face].normal);
-        continue;
-      }
-      centre[p] = beam_point(engine, seen[p], 1, pixel, BeamPoint::kCentre);
-      trace_grid(x, kFiner * s, finer, finer_panes);
-      for (const PartOfPixel& part : pixel_parts.tell_apart(found, finer)) {
-        const float share = static_cast<float>(part.places.size()) / static_cast<float>(finer.size()),
-                    weight = share / static_cast<float>(part.samples.size());
-        const std::size_t first_point = row.fine.size();
-        for (const Sample& sample : part.samples) {
-          const BeamPoint point = add_sample(engine, sample.seen, weight, pixel, sample.place, row.smooth[x], row);
-          if (point.surface >= 0) row.fine.push_back(point);
-        }
-        if (row.fine.size() == first_point) continue;
-        row.parts.push_back({first_point, row.fine.size(), row.places.size(), row.places.size() + part.places.size()});
-        row.places.insert(row.places.end(), part.places.begin(), part.places.end());
-      }
-      const float weight = 1 / static_cast<float>(s * s);
-      for (const SeenPane& pane : panes_found)
-        row.on_panes.push_back(
-            add_sample(engine, pane.seen, weight, pixel, static_cast<int>(pane.ray), row.smooth[x], row));
-    }
-    for (const SeenPane& pane : panes[y])
-      if (!has_edge[y * row_size + pane.ray])
-        row.on_panes.push_back(
-            add_sample(engine, pane.seen, 1, static_cast<int>(y * row_size + pane.ray), -1, row.smooth[pane.ray], row));
-    for (std::vector<Share>& shares : row.smooth) merge_shares(shares);
-  });
-  std::size_t share_count = 0;
-  for (const RowOfPixels& row : rows)
-    for (const std::vector<Share>& shares : row.smooth) share_count += shares.size();
-  smooth.entries.reserve(share_count);
-  smooth.begin.reserve(pixel_count + 1);
-  for (const RowOfPixels& row : rows) {
-    for (const Part& part : row.parts)
-      parts.push_back({part.first_point + fine.size(), part.last_point + fine.size(), part.first_place + places.size(),
-                       part.last_place + places.size()});
-    places.insert(places.end(), row.places.begin(), row.places.end());
-    fine.insert(fine.end(), row.fine.begin(), row.fine.end());
-    on_panes.insert(on_panes.end(), row.on_panes.begin(), row.on_panes.end());
-    constant.insert(constant.end(), row.constant.begin(), row.constant.end());
-    outlooks.insert(outlooks.end(), row.outlooks.begin(), row.outlooks.end());
-    panels.insert(panels.end(), row.panels.begin(), row.panels.end());
-    for (const std::vector<Share>& shares : row.smooth) smooth.append(shares);
+  for (const Row& row : rows) {
+    list_surfaces(row.centre_groups);
+    list_surfaces(row.pane_groups);
+    list_surfaces(row.parts);
   }
-  edge_pixel_count = static_cast<int>(std::count(has_edge.begin(), has_edge.end(), 1));
 }
 
 }  // namespace transom

@@ -73,6 +73,65 @@ TEST(Frame, ThePictureIsTheSameWithoutItsParts) {
     EXPECT_NEAR(sum.radiance[p].y, all.radiance[p].y, 1e-4f * all.radiance[p].y);
 }
 
+// Where openings stand is decided in closed form, and rays are cast only where light may fall: the same light as that
+// of a ray from every pixel.
+TEST(Frame, BeamsArriveWhereRaysFromEveryPixelSay) {
+  SceneGeometry scene = roof_light_room(0.5f, 0.7f);
+  test::add_box(scene, {1.8, 1.6, 0.1}, {2.3, 2.2, 0.9}, 0);
+  test::add_box(scene, {1.2, 1.5, 3.5}, {2.2, 1.6, 3.6}, 0);  // before the roof light
+  const Engine engine(scene, tregenza(), few_rays());
+  const auto light = engine.relight(sunny(0.3f));
+  View from_outdoors = into_the_room();
+  from_outdoors.position = {2, -2, 6};
+  from_outdoors.target = {2, 2, 2};
+  for (const View& view : {into_the_room(), from_outdoors}) {
+    FrameOptions centres;
+    centres.edge_samples = 1;
+    const Frame frame = FrameRenderer(engine).render(view, *light, centres);
+    const PrimaryHits hits = trace_primary(scene, view);
+    int lit = 0, different = 0;
+    for (std::size_t p = 0; p < hits.face.size(); ++p) {
+      if (hits.face[p] < 0 || scene.materials[scene.face_material[hits.face[p]]].opening >= 0) continue;
+      const glm::ivec4 corner = scene.faces[hits.face[p]];
+      const glm::dvec3 a = scene.vertices[corner[0]], b = scene.vertices[corner[1]], c = scene.vertices[corner[2]];
+      glm::dvec3 normal = glm::normalize(glm::cross(b - a, c - a));
+      if (glm::dot(normal, view.position - hits.position[p]) < 0) normal = -normal;
+      const glm::vec3 lifted(hits.position[p] - engine.faces().origin +
+                             static_cast<double>(engine.faces().ray_offset()) * normal);
+      const float expected =
+          engine.direct_light().illuminance(light->condition.beams, lifted, glm::vec3(normal)).y * 0.5f / 3.14159265f;
+      lit += expected > 0;
+      different += std::abs(frame.sun[p].y - expected) > 1e-3f * expected;
+    }
+    EXPECT_GT(lit, 100);
+    EXPECT_LE(different, 2);  // at the very edge of shade or light
+  }
+}
+
+TEST(RayScene, RaysFromOnePointMeetWhatTheyMeetOneByOne) {
+  const Engine engine(roof_light_room(0.5f), tregenza(), few_rays());
+  const glm::vec3 origin = glm::vec3(glm::dvec3(1, 1, 1.5) - engine.faces().origin);
+  std::vector<Ray> rays;
+  std::vector<float> x, y, z;
+  for (int i = 0; i < 37; ++i) {  // not a multiple of a packet
+    const float turn = 0.17f * static_cast<float>(i);
+    rays.push_back(
+        {origin, glm::normalize(glm::vec3(std::cos(turn), std::sin(turn), 0.1f * static_cast<float>(i - 18)))});
+    x.push_back(rays.back().direction.x);
+    y.push_back(rays.back().direction.y);
+    z.push_back(rays.back().direction.z);
+  }
+  std::vector<Hit> together(rays.size()), one_by_one(rays.size());
+  engine.rays().intersect_from(origin, x.data(), y.data(), z.data(), RayScene::What::kAll, together);
+  engine.rays().intersect(RayScene::What::kAll, rays, one_by_one);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    EXPECT_EQ(together[i].face, one_by_one[i].face);
+    EXPECT_EQ(together[i].side, one_by_one[i].side);
+    EXPECT_FLOAT_EQ(together[i].t, one_by_one[i].t);
+    EXPECT_LT(glm::distance(together[i].st, one_by_one[i].st), 1e-5f);
+  }
+}
+
 double sum_of_sun(const Frame& frame) {
   double sum = 0;
   for (const glm::vec3& value : frame.sun) sum += value.y;
@@ -126,8 +185,8 @@ TEST(Frame, APictureOfTheSkyIsSeenWhereItsTexelsAre) {
     for (int column = 0; column < kWidth; ++column) {
       const float theta = kPi / 2 * static_cast<float>(row) / (kHeight - 1) - 1e-6f,
                   phi = 2 * kPi * (static_cast<float>(column) + 0.5f) / kWidth;
-      const glm::vec3 seen = condition.seen(
-          {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)}, bins);
+      const glm::vec3 seen =
+          condition.seen({std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)}, bins);
       const auto expected = static_cast<float>(row * kWidth + column);
       EXPECT_NEAR(seen.y, expected, 0.01f);
       EXPECT_FLOAT_EQ(seen.x, seen.y / 2);

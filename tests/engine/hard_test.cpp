@@ -130,7 +130,8 @@ TEST(Condition, LightThatIsNoNumberIsRefused) {
   flat_picture.picture.assign(4, 1.f);
   flat_picture.picture_width = 4;
   flat_picture.picture_height = 1;
-  for (const Condition& bad : {sky, colour, direction, picture, flat_picture}) EXPECT_THROW(engine.relight(bad), InputError);
+  for (const Condition& bad : {sky, colour, direction, picture, flat_picture})
+    EXPECT_THROW(engine.relight(bad), InputError);
 }
 
 TEST(View, PlaceThatIsNoNumberIsRefused) {

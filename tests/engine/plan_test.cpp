@@ -126,7 +126,7 @@ TEST(Plan, OutlinesKnowWhatLightHasPassedAsRaysDo) {
     outlines.along_beam(points, seen);
     for (int k = 0; k < 3; ++k) {
       std::vector<int> is_behind(points.size());
-      outlines.mark_behind(k, seen, is_behind);
+      outlines.mark_behind(k, seen.x, seen.y, seen.z, is_behind);
       for (std::size_t i = 0; i < points.size(); ++i) share[i] *= is_behind[i] ? 0.5f : 1.f;
     }
     for (std::size_t i = 0; i < points.size(); ++i)

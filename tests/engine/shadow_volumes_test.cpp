@@ -144,6 +144,24 @@ RayAnswer trace(const TestScene& scene, const VolumeCamera& camera, glm::dvec3 s
   return answer;
 }
 
+/// Whether the point seen through a pixel's centre lies in a box.
+bool is_seen_in(const TestScene& scene, const VolumeCamera& camera, const std::pair<glm::vec3, glm::vec3>& box, int x,
+                int y) {
+  const glm::dvec3 forward = glm::normalize(camera.target - camera.position),
+                   right = glm::normalize(glm::cross(forward, camera.up));
+  const double pixel = 2 * std::tan(camera.vertical_fov_rad / 2) / camera.height;
+  const glm::dvec3 direction = forward + right * (pixel * (x + 0.5 - 0.5 * camera.width)) -
+                               glm::cross(right, forward) * (pixel * (y + 0.5 - 0.5 * camera.height));
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const glm::uvec3& triangle : scene.opaque) {
+    const double distance = intersect(scene, triangle, camera.position, direction).value_or(-1);
+    if (distance > 0) nearest = std::min(nearest, distance);
+  }
+  const glm::dvec3 point = camera.position + nearest * direction;
+  return glm::all(glm::greaterThanEqual(point, glm::dvec3(box.first))) &&
+         glm::all(glm::lessThanEqual(point, glm::dvec3(box.second)));
+}
+
 /// Whether the rays' answer changes within one pixel of the pixel's centre.
 bool is_edge(const TestScene& scene, const VolumeCamera& camera, glm::dvec3 sun, int x, int y) {
   const RayAnswer centre = trace(scene, camera, sun, x + 0.5, y + 0.5);
@@ -303,6 +321,36 @@ TEST_P(ShadowVolumesTest, AClosedBoxIsDarkWhicheverWayItsNormalsLook) {
   }
 }
 
+TEST_P(ShadowVolumesTest, ARangeIsThatPartOfTheWholePicture) {
+  const TestScene scene = furnished_room();
+  const VolumeCamera camera = room_camera();
+  ShadowVolumes volumes(*context_, scene.vertices, scene.opaque, scene.openings);
+  const BeamMask whole = volumes.render(camera, kMorningSun);
+  VolumeRange range{20, 31, 117, 88, {}};
+  const std::pair<glm::vec3, glm::vec3> box{{1, 0.5F, -0.1F}, {5, 3, 0.1F}};  // of the floor
+  for (const bool is_boxed : {false, true}) {
+    if (is_boxed) range.boxes.push_back(box);
+    const BeamMask part = volumes.render(camera, kMorningSun, range);
+    ASSERT_EQ(part.width, range.right - range.left);
+    ASSERT_EQ(part.height, range.bottom - range.top);
+    int compared = 0, shadowed = 0;
+    for (int y = 0; y < part.height; ++y)
+      for (int x = 0; x < part.width; ++x) {
+        if (is_boxed && !is_seen_in(scene, camera, box, x + range.left, y + range.top)) continue;
+        const auto own = static_cast<std::size_t>(y * part.width + x),
+                   of_whole = static_cast<std::size_t>((y + range.top) * camera.width + x + range.left);
+        ASSERT_EQ(part.shadowed[own], whole.shadowed[of_whole]) << x << ' ' << y;
+        for (std::size_t group = 0; group < part.crossings.size(); ++group)
+          ASSERT_EQ(part.crossings[group][own], whole.crossings[group][of_whole]);
+        ++compared;
+        shadowed += part.shadowed[own];
+      }
+    EXPECT_GT(compared, 400);
+    EXPECT_GT(shadowed, 0);
+    EXPECT_LT(shadowed, compared);
+  }
+}
+
 TEST_P(ShadowVolumesTest, SkipsWhatContributesNothing) {
   TestScene scene = furnished_room();
   scene.openings.resize(4);                                  // two empty groups
@@ -373,6 +421,24 @@ TEST(ShadowCastersTest, SilhouetteOfACubeIsAHexagon) {
   const ShadowCasters sheets(scene.vertices, welded, scene.opaque, CasterCount::kEveryTriangle);
   EXPECT_EQ(sheets.volume(sun, 99).indices.size(), 3U * (12 + 2 * 6));  // both shells
   EXPECT_EQ(sheets.volume(sun, 99).clockwise_count, 3U * 6);
+}
+
+TEST(ShadowCastersTest, CastersWhoseShadeFallsElsewhereAreLeftOut) {
+  TestScene scene;
+  scene.add_box({0, 0, 1}, {1, 1, 2});
+  scene.add_box({4, 0, 1}, {5, 1, 2});
+  const ShadowCasters casters(scene.vertices, weld_vertices(scene.vertices), scene.opaque, CasterCount::kSolidsOnce);
+  const glm::dvec3 sun(0, 0, 1);
+  const auto corners_for = [&](glm::vec3 low, glm::vec3 high) {
+    const std::vector<std::pair<glm::vec3, glm::vec3>> boxes{{low, high}};
+    return casters.volume(sun, 99, scene.vertices, ShadedPoints(sun, boxes)).indices.size();
+  };
+  EXPECT_EQ(corners_for({-1, -1, 0}, {6, 2, 0}), casters.volume(sun, 99).indices.size());
+  EXPECT_EQ(corners_for({0, 0, 0}, {1, 1, 0}), casters.volume(sun, 99).indices.size() / 2);
+  EXPECT_EQ(corners_for({2, 0, 0}, {3, 1, 0}), 0U);  // between them
+  const std::vector<std::pair<glm::vec3, glm::vec3>> apart{{{-1, 0, 0}, {-0.5F, 1, 0}}, {{5.5F, 0, 0}, {6, 1, 0}}};
+  EXPECT_EQ(casters.volume(sun, 99, scene.vertices, ShadedPoints(sun, apart)).indices.size(), 0U);  // beside both
+  EXPECT_EQ(corners_for({0, 0, 3}, {5, 1, 4}), 0U);                                                 // above both
 }
 
 TEST(ShadowCastersTest, WeldsEqualPositionsOnly) {

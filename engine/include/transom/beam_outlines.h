@@ -49,12 +49,16 @@ class BeamOutlines {
     }
   };
 
-  /// Points as seen along the beam: their place across it, and in z how far towards the source they are [m].
+  /// A point as seen along the beam: its place across it, and in z how far towards the source it is [m].
+  glm::vec3 along_beam(glm::vec3 point) const {
+    return {glm::dot(point, across_), glm::dot(point, along_), glm::dot(point, towards_)};
+  }
   void along_beam(const Points& points, Points& seen) const;
 
-  /// Which points, as along_beam has them, lie behind passage k, a planar one: light that arrives there along the beam
-  /// has come through it. Exactly; is_behind: 1 or 0 for each.
-  void mark_behind(int k, const Points& seen, std::span<int> is_behind) const;
+  /// Which points (as along_beam has them: coordinates x, y and z, one after the other) lie behind passage k, a planar
+  /// one: light that arrives there along the beam has come through it. Exactly; is_behind: 1 or 0 for each.
+  void mark_behind(int k, std::span<const float> x, std::span<const float> y, std::span<const float> z,
+                   std::span<int> is_behind) const;
 
  private:
   struct Passage {

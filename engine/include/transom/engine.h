@@ -141,6 +141,10 @@ class Engine {
   /// Radiance reflected by every node, then by every patch, of the light of sky and of surfaces [cd/m²].
   void shown_radiance(const Lighting& lighting, std::vector<glm::vec4>& sky, std::vector<glm::vec4>& indirect) const;
 
+  /// Whether a slot takes part, and whether beams are then known to reach it through openings alone.
+  bool is_patch(int slot) const { return patch_of_slot_[slot] >= 0; }
+  bool is_behind_openings(int slot) const { return receivers_.is_behind_openings[patch_of_slot_[slot]] != 0; }
+
   const SparseRows& form_factors() const { return *form_factors_; }
   const std::vector<float>& patch_areas() const { return patch_area_; }
   const std::vector<int>& patch_slots() const { return slot_of_patch_; }

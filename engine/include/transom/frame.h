@@ -14,6 +14,8 @@
 
 namespace transom {
 
+class SeenBeam;
+
 /// How beams are tested per pixel.
 enum class Visibility { kRays, kVolumes };
 
@@ -24,17 +26,36 @@ struct FrameOptions {
   bool components = true;  ///< the parts of the picture beside their sum
 };
 
+/// Gives memory that nobody has cleared: what is made in it is written once.
+template <typename Value>
+struct Unset : std::allocator<Value> {
+  template <typename Other>
+  struct rebind {
+    using other = Unset<Other>;
+  };
+  template <typename Made, typename... Arguments>
+  void construct(Made* place, Arguments&&... arguments) {
+    if constexpr (sizeof...(Arguments) == 0)
+      ::new (static_cast<void*>(place)) Made;
+    else
+      ::new (static_cast<void*>(place)) Made(std::forward<Arguments>(arguments)...);
+  }
+};
+
+/// Pixels, rows from the top.
+using Picture = std::vector<glm::vec3, Unset<glm::vec3>>;
+
 /// A picture in cd/m², and its parts by what the light has done last. Their sum is `radiance`.
 struct Frame {
   int width = 0, height = 0;
-  std::vector<glm::vec3> radiance;
-  std::vector<glm::vec3> sun;       ///< beams and point sources, reflected once
-  std::vector<glm::vec3> sky;       ///< sky and ground, reflected once
-  std::vector<glm::vec3> indirect;  ///< reflected more than once
-  std::vector<glm::vec3> emitted;   ///< emitters seen
-  std::vector<glm::vec3> exterior;  ///< sky and ground, and emitters seen through openings
-  int edge_pixel_count = 0;         ///< pixels that were supersampled
-  int pass_count = 0;               ///< kVolumes: passes of the stencil method
+  Picture radiance;
+  Picture sun;               ///< beams and point sources, reflected once
+  Picture sky;               ///< sky and ground, reflected once
+  Picture indirect;          ///< reflected more than once
+  Picture emitted;           ///< emitters seen
+  Picture exterior;          ///< sky and ground, and emitters seen through openings
+  int edge_pixel_count = 0;  ///< pixels that were supersampled
+  int pass_count = 0;        ///< kVolumes: passes of the stencil method
 };
 
 /// What pixel centres look at.
@@ -57,30 +78,36 @@ class FrameRenderer {
 
  private:
   class Masks;
-  /// What bounds a block of beam points.
-  struct Box {
-    glm::vec3 low{0}, high{0};
-  };
-  std::vector<Box> boxes_of(const std::vector<BeamPoint>& points) const;
-  void find_shares_by_block(const Beam& beam, const std::vector<BeamPoint>& points, const std::vector<Box>& boxes,
-                            const std::vector<float>* mask_share, const Masks& masks, std::vector<float>& shares) const;
+  struct Drawing;
+  struct Scratch;
   struct VolumeGroup {
     int opening;
     glm::vec3 normal;
   };
+  void see(const View& view, int edge_samples);
+  VolumeRange lit_range(const SeenBeam& seen) const;
   void make_volumes();
   int render_mask(const Beam& beam, const View& view, const Masks& masks, std::vector<float>& share);
-  int render_shafts(const Beam& lobe, const VolumeCamera& camera, std::vector<float>& share);
+  int render_shafts(const Beam& lobe, const VolumeCamera& camera, const Masks& masks, std::vector<float>& share);
   const VolumeCasters& casters_behind(glm::vec4 plane);
-  void add_smooth_light(const ViewSamples& samples, const Lighting& lighting, bool components, Frame& frame) const;
-  void add_beam(const ViewSamples& samples, const Beam& beam, const std::vector<float>* mask_share, const Masks& masks,
-                std::vector<glm::vec3>& picture, std::vector<char>& is_edge) const;
-  void find_shares(const Beam& beam, std::span<const BeamPoint> points, const std::vector<float>* mask_share,
-                   const Masks& masks, std::span<float> shares) const;
+  void draw(Drawing& drawing);
+  void find_centre_shares(const Drawing& drawing, std::size_t beam, int row);
+  void add_beam(const Drawing& drawing, std::size_t beam, int row, glm::vec3* sun);
+  void add_to_pixels(const Drawing& drawing, std::size_t beam, int row, Scratch& scratch, glm::vec3* sun);
+  void add_to_parts(const Drawing& drawing, std::size_t beam, int row, Scratch& scratch, glm::vec3* sun);
+  void put_on_plane(const Drawing& drawing, BeamPoint point, std::span<const glm::vec2> places, Scratch& scratch) const;
+  void add_to_panes(const Drawing& drawing, std::size_t beam, int row, Scratch& scratch, glm::vec3* sun) const;
+  void finish(const Drawing& drawing, int row) const;
+  const float* centre_shares(std::size_t beam, int row) const;
 
   const Engine& engine_;
+  std::vector<char> is_enclosed_;         // by surface: beams reach it through openings alone
   std::unique_ptr<ViewSamples> samples_;  // of the last camera
-  std::vector<Box> centre_boxes_, fine_boxes_, pane_boxes_;
+  std::vector<glm::vec2> places_, finer_places_;
+  std::vector<std::vector<float, Unset<float>>> centre_share_;  // by beam and pixel, in rows that are lit
+  std::vector<char> is_lit_row_;                                // by beam and row
+  std::vector<float> dark_row_;
+  std::vector<char> is_edge_;
   std::unique_ptr<GlContext> context_;
   std::unique_ptr<ShadowVolumes> volumes_;
   std::vector<VolumeGroup> volume_groups_;  // openings of one kind and orientation, as the stencil counts them

@@ -44,6 +44,10 @@ class RayScene {
   /// First hit of every ray. `hits` has the size of `rays`.
   void intersect(What what, std::span<const Ray> rays, std::span<Hit> hits, Order order = Order::kScattered) const;
 
+  /// The same of rays from one point, in order; x, y and z: their directions, as many as `hits`.
+  void intersect_from(glm::vec3 origin, const float* x, const float* y, const float* z, What what,
+                      std::span<Hit> hits) const;
+
   /// 1 where something opaque (or of `what`) lies between t_near and t_far, else 0.
   void occluded(What what, std::span<const Ray> rays, std::span<std::uint8_t> blocked,
                 Order order = Order::kScattered) const;
@@ -60,6 +64,8 @@ class RayScene {
 
  private:
   struct Tree;
+  Hit hit_of(const Tree& tree, unsigned triangle, glm::vec2 barycentric, float t, glm::vec3 direction) const;
+
   const Faces& faces_;
   const std::vector<Material>& materials_;
   const std::vector<OpeningGroup>& openings_;

@@ -5,6 +5,7 @@
 #include <glm/glm.hpp>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "transom/gl_context.h"
@@ -20,12 +21,21 @@ struct VolumeCamera {
   bool operator==(const VolumeCamera&) const = default;
 };
 
-/// Sun visibility of each pixel's visible point, rows from the top: index = y * width + x.
+/// Where answers are wanted. The less that is, the fewer pixels and casters are drawn.
+struct VolumeRange {
+  /// Pixels of the picture: from (left, top) on, below (right, bottom).
+  int left = 0, top = 0, right = 0, bottom = 0;
+  /// Visible points in these pixels, in boxes: two corners each. Empty: any. Of others the answers may be anything.
+  std::vector<std::pair<glm::vec3, glm::vec3>> boxes;
+};
+
+/// Sun visibility of the visible point of each pixel of a range, rows from its top: index = (y - top) * width + x -
+/// left.
 ///
 /// Meaningful where an opaque surface is seen on the side that faces the sun. On a side that faces away (unlit by its
 /// cosine in any case) and where no surface is seen, the values may be anything.
 struct BeamMask {
-  int width = 0, height = 0;
+  int width = 0, height = 0;           ///< of the range
   std::vector<std::uint8_t> shadowed;  ///< 1: an opaque triangle lies between the visible point and the sun; else 0
   std::vector<std::vector<std::uint8_t>> crossings;  ///< [group]: that group's openings between visible point and sun
 };
@@ -69,10 +79,11 @@ class ShadowVolumes {
   /// direction_to_sun: any length but zero. Throws InputError for an impossible camera or direction, GlError if OpenGL
   /// fails.
   BeamMask render(const VolumeCamera& camera, glm::dvec3 direction_to_sun);
+  BeamMask render(const VolumeCamera& camera, glm::dvec3 direction_to_sun, const VolumeRange& range);
 
-  /// How many of the casters lie between each visible point and the source of parallel light, modulo 256.
+  /// How many of the casters lie between each visible point of a range and the source of parallel light, modulo 256.
   std::vector<std::uint8_t> count(const VolumeCamera& camera, glm::dvec3 direction_to_source,
-                                  const VolumeCasters& casters);
+                                  const VolumeCasters& casters, const VolumeRange& range);
 
   /// Passes of the last render or count: one for visible surfaces unless the camera is the previous one, one for opaque
   /// casters, one for each opening group whose light can be in the picture.

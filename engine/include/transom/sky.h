@@ -73,6 +73,10 @@ struct Condition {
   /// Beams at points: sub-suns, where there are any, in place of the sun; lobes.
   std::vector<Beam> beams_at_points() const;
   glm::vec3 seen(glm::vec3 direction, const SkyBinIndex& bins) const;
+  /// The same for a direction whose place in pictures is known.
+  glm::vec3 seen(glm::vec3 direction, glm::vec2 place, const SkyBinIndex& bins) const;
+  /// Where pictures show a direction above the horizon: azimuth in turns, angle from the zenith in right angles.
+  static glm::vec2 place_in_pictures(glm::vec3 direction);
 };
 
 }  // namespace transom

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <glm/glm.hpp>
+#include <span>
 
 namespace transom {
 
@@ -25,6 +26,8 @@ class CameraRays {
  public:
   explicit CameraRays(const View& view);
   glm::vec3 direction(glm::vec2 pixel) const;
+  /// The same for places of a pixel, from its upper left corner. x, y and z have the size of `places`.
+  void directions(glm::vec2 corner, std::span<const glm::vec2> places, float* x, float* y, float* z) const;
 
  private:
   glm::dvec3 forward_, right_, down_;

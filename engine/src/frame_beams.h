@@ -1,0 +1,76 @@
+/// @file One beam and the points of a picture: which of them may be lit, through which openings, and rays for those.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "transom/beam_outlines.h"
+#include "transom/engine.h"
+#include "transom/view_samples.h"
+
+namespace transom {
+
+/// Rays towards a source, collected so that they are traced sixteen at a time.
+class ShadowRays {
+ public:
+  /// share: what arrives at the start of the ray if nothing is in its way.
+  void add(const Ray& ray, float* share) {
+    rays_.push_back(ray);
+    shares_.push_back(share);
+  }
+  /// Sets the shares to 0 whose rays meet something, and forgets them all.
+  void trace(const RayScene& scene, RayScene::What what);
+
+ private:
+  std::vector<Ray> rays_;
+  std::vector<float*> shares_;
+  std::vector<std::uint8_t> blocked_;
+};
+
+/// A beam as the surfaces of a picture see it. What openings do to the sun is known in closed form, as in deposits:
+/// rays look only for what is opaque, and only from points that openings let light to.
+class SeenBeam {
+ public:
+  /// surfaces: all that will be asked about, as face * 2 + side. is_enclosed: by surface, whether beams reach it
+  /// through openings alone.
+  SeenBeam(const Engine& engine, const Beam& beam, std::span<const int> surfaces, const std::vector<char>& is_enclosed);
+
+  /// Whether a surface faces the beam, and something of it may be lit.
+  bool may_light(int surface) const { return may_light_[static_cast<std::size_t>(surface)] != 0; }
+  /// Whether points of a group may be lit.
+  bool may_light(const BeamGroup& group) const;
+
+  /// Share of the beam that arrives at points of one surface. Where `rays` are added it is so if they meet nothing, and
+  /// 0 else.
+  void find_shares(int surface, std::span<const BeamPoint> points, std::span<float> shares, ShadowRays& rays) const;
+  void trace(ShadowRays& rays) const;
+
+  bool faces(const BeamPoint& point) const { return glm::dot(point.normal, beam_->direction_to_source) > 0; }
+
+  /// What a point that a share of the beam reaches adds to its pixel [cd/m²].
+  glm::vec3 reflected(const BeamPoint& point, float share) const;
+
+ private:
+  void find_shares_of_sun(int surface, std::span<const BeamPoint> points, std::span<float> shares,
+                          ShadowRays& rays) const;
+  bool may_cover(int passage, glm::vec3 low, glm::vec3 high) const;
+  void find_shares_of_lobe(std::span<const BeamPoint> points, std::span<float> shares, ShadowRays& rays) const;
+
+  const Engine* engine_;
+  const Beam* beam_;
+  const std::vector<char>* is_enclosed_;
+  std::vector<char> may_light_;           // by surface
+  std::optional<BeamOutlines> outlines_;  // of openings before the sun
+  glm::mat3 absolute_axes_{0};            // how far along them a box reaches: sizes of their coordinates
+  float margin_;                          // of boxes, more than rounding [m]
+  struct Passage {
+    BeamOutline outline;
+    float transmittance;
+  };
+  std::vector<Passage> passages_;
+  std::vector<std::vector<int>> over_;  // by surface: passages that may cover it
+};
+
+}  // namespace transom

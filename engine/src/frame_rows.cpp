@@ -1,0 +1,231 @@
+// Beams in the rows of a picture: at the one point of each pixel first, then at many where light ends.
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "frame_drawing.h"
+
+namespace transom {
+namespace {
+
+constexpr float kSameShare = 0.02f;  // of a beam, between neighbouring pixels without an edge
+constexpr float kSameCurve = 0.9f;   // cosine between normals of neighbouring pixels on one surface
+
+// Whether a point is on the surface of another one, flat or curved.
+bool is_continued(const BeamPoint& a, const BeamPoint& b) {
+  if (b.surface < 0 || glm::dot(a.normal, b.normal) < kSameCurve) return false;
+  const glm::vec3 between = b.position - a.position;
+  return std::abs(glm::dot(between, a.normal)) < (1 - kSameCurve) * glm::length(between);
+}
+
+}  // namespace
+
+const float* FrameRenderer::centre_shares(std::size_t beam, int row) const {
+  const auto height = static_cast<std::size_t>(samples_->view.height),
+             width = static_cast<std::size_t>(samples_->view.width), y = static_cast<std::size_t>(row);
+  return is_lit_row_[beam * height + y] ? &centre_share_[beam][y * width] : dark_row_.data();
+}
+
+void FrameRenderer::find_centre_shares(const Drawing& drawing, std::size_t beam, int row) {
+  thread_local ShadowRays rays;
+  const auto y = static_cast<std::size_t>(row), width = static_cast<std::size_t>(samples_->view.width);
+  float* const shares = &centre_share_[beam][y * width];
+  const SeenBeam& seen = drawing.beams[beam];
+  bool is_reached = false;
+  for (const BeamGroup& group : samples_->rows[y].centre_groups) {
+    if (!seen.may_light(group)) continue;
+    if (!std::exchange(is_reached, true)) std::fill(shares, shares + width, 0.f);
+    const std::span<const BeamPoint> points(&samples_->centre[group.first], group.last - group.first);
+    const std::span<float> of_group(shares + group.first - y * width, points.size());
+    if (drawing.masks)
+      for (std::size_t i = 0; i < points.size(); ++i)
+        of_group[i] = seen.faces(points[i]) ? drawing.mask_share[drawing.masks->index(points[i].pixel, -1)] : 0.f;
+    else
+      seen.find_shares(group.surface, points, of_group, rays);
+  }
+  seen.trace(rays);
+  is_lit_row_[beam * static_cast<std::size_t>(samples_->view.height) + y] =
+      is_reached && std::any_of(shares, shares + width, [](float share) { return share > 0; });
+}
+
+void FrameRenderer::add_beam(const Drawing& drawing, std::size_t beam, int row, glm::vec3* sun) {
+  thread_local Scratch scratch;
+  add_to_pixels(drawing, beam, row, scratch, sun);
+  add_to_parts(drawing, beam, row, scratch, sun);
+  add_to_panes(drawing, beam, row, scratch, sun);
+}
+
+// Pixels on one surface: one point speaks for them, unless neighbours are lit otherwise. Then all samples are tested on
+// its plane.
+void FrameRenderer::add_to_pixels(const Drawing& drawing, std::size_t beam, int row, Scratch& scratch, glm::vec3* sun) {
+  const ViewSamples& samples = *samples_;
+  const SeenBeam& seen = drawing.beams[beam];
+  const int width = samples.view.width, height = samples.view.height, s = samples.edge_samples;
+  const float* const own = centre_shares(beam, row);
+  const float* const above = row > 0 ? centre_shares(beam, row - 1) : own;
+  const float* const below = row + 1 < height ? centre_shares(beam, row + 1) : own;
+  const bool is_dark = own == dark_row_.data() && above == own && below == own;
+  if (!drawing.masks && is_dark) return;
+  scratch.highest.resize(static_cast<std::size_t>(width));
+  scratch.lowest.resize(static_cast<std::size_t>(width));
+  float *const highest = scratch.highest.data(), *const lowest = scratch.lowest.data();
+  for (int x = 0; x < width; ++x) {
+    highest[x] = std::max(std::max(above[x], below[x]), own[x]);
+    lowest[x] = std::min(std::min(above[x], below[x]), own[x]);
+  }
+  const auto differs = [&](int x) {
+    const int left = std::max(x - 1, 0), right = std::min(x + 1, width - 1);
+    return std::max(std::max(highest[left], highest[right]), highest[x]) - own[x] > kSameShare ||
+           own[x] - std::min(std::min(lowest[left], lowest[right]), lowest[x]) > kSameShare;
+  };
+  const auto masks_differ = [&](int pixel) {
+    const auto of_mask = [&](int sample) { return drawing.mask_share[drawing.masks->index(pixel, sample)]; };
+    for (int k = 0; k < s * s; ++k)
+      if (of_mask(k) != of_mask(-1)) return true;
+    return false;
+  };
+  scratch.chosen.clear();
+  for (const BeamGroup& group : samples.rows[row].centre_groups) {
+    if (!seen.may_light(group.surface)) continue;
+    for (std::size_t p = group.first; p < group.last; ++p) {
+      if (samples.has_edge[p]) continue;
+      const int x = samples.centre[p].pixel - row * width;
+      if (s > 1 &&
+          (differs(x) || (drawing.masks && drawing.masks->holds(x, row) && masks_differ(samples.centre[p].pixel))))
+        scratch.chosen.push_back(p);
+      else if (own[x] > 0)
+        sun[x] += seen.reflected(samples.centre[p], own[x]);
+    }
+  }
+  const std::size_t sample_count = places_.size();
+  scratch.points.clear();
+  for (const std::size_t p : scratch.chosen) {
+    is_edge_[p] = 1;
+    put_on_plane(drawing, samples.centre[p], places_, scratch);
+  }
+  scratch.shares.resize(scratch.points.size());
+  for (std::size_t k = 0; k < scratch.points.size(); k += sample_count)
+    seen.find_shares(scratch.points[k].surface, {&scratch.points[k], sample_count}, {&scratch.shares[k], sample_count},
+                     scratch.rays);
+  seen.trace(scratch.rays);
+  for (std::size_t k = 0; k < scratch.points.size(); k += sample_count) {
+    const float sum = std::accumulate(&scratch.shares[k], &scratch.shares[k] + sample_count, 0.f);
+    if (sum > 0)
+      sun[scratch.points[k].pixel - row * width] +=
+          seen.reflected(scratch.points[k], sum / static_cast<float>(sample_count));
+  }
+}
+
+// Adds points of a pixel on the plane of one of them.
+void FrameRenderer::put_on_plane(const Drawing& drawing, BeamPoint point, std::span<const glm::vec2> places,
+                                 Scratch& scratch) const {
+  scratch.positions.resize(places.size());
+  const int width = samples_->view.width;
+  places_on_plane(drawing.camera, drawing.eye, glm::vec2(point.pixel % width, point.pixel / width), places,
+                  point.position, engine_.faces().faces[point.surface / 2].normal, scratch.positions);
+  for (const glm::vec3& position : scratch.positions) {
+    point.position = position;
+    scratch.points.push_back(point);
+  }
+}
+
+// Pixels with an edge of a surface: every sample for itself, unless a beam ends within what is seen of a surface. Then
+// all places at which that is seen are tested on its plane.
+void FrameRenderer::add_to_parts(const Drawing& drawing, std::size_t beam, int row, Scratch& scratch, glm::vec3* sun) {
+  const ViewSamples::Row& samples = samples_->rows[row];
+  const SeenBeam& seen = drawing.beams[beam];
+  const int width = samples_->view.width, height = samples_->view.height;
+  if (samples.parts.empty()) return;
+  scratch.shares.assign(samples.fine.size(), 0.f);
+  const auto shares_of = [&](const ViewSamples::Part& part) {
+    return std::span<float>(&scratch.shares[part.first], part.last - part.first);
+  };
+  scratch.chosen.clear();
+  for (std::size_t i = 0; i < samples.parts.size(); ++i) {
+    const ViewSamples::Part& part = samples.parts[i];
+    if (!seen.may_light(part.surface)) continue;
+    scratch.chosen.push_back(i);
+    if (!seen.may_light(part)) continue;
+    const std::span<const BeamPoint> points(&samples.fine[part.first], part.last - part.first);
+    const std::span<float> shares = shares_of(part);
+    if (!drawing.masks || points[0].sample == BeamPoint::kNotInMasks)
+      seen.find_shares(part.surface, points, shares, scratch.rays);
+    else
+      for (std::size_t k = 0; k < points.size(); ++k)
+        shares[k] =
+            seen.faces(points[k]) ? drawing.mask_share[drawing.masks->index(points[k].pixel, points[k].sample)] : 0.f;
+  }
+  seen.trace(scratch.rays);
+
+  const int first_row = std::max(row - 1, 0), last_row = std::min(row + 1, height - 1);
+  const float* around[3]{};
+  for (int y = first_row; y <= last_row; ++y) around[y - first_row] = centre_shares(beam, y);
+  const auto light_ends_in = [&](const ViewSamples::Part& part) {
+    const std::span<const float> shares = shares_of(part);
+    const auto is_other = [&](float other) { return std::abs(other - shares[0]) > kSameShare; };
+    if (std::any_of(shares.begin(), shares.end(), is_other)) return true;
+    const BeamPoint& first = samples.fine[part.first];
+    const int x = first.pixel - row * width;
+    for (int y = first_row; y <= last_row; ++y)
+      for (int i = std::max(x - 1, 0); i <= std::min(x + 1, width - 1); ++i)
+        if (is_other(around[y - first_row][i]) && is_continued(first, samples_->centre[y * width + i])) return true;
+    return false;
+  };
+  std::erase_if(scratch.chosen, [&](std::size_t i) {
+    const ViewSamples::Part& part = samples.parts[i];
+    if (light_ends_in(part)) return false;
+    const std::span<const float> shares = shares_of(part);
+    for (std::size_t k = 0; k < shares.size(); ++k)
+      if (shares[k] > 0)
+        sun[samples.fine[part.first + k].pixel - row * width] +=
+            seen.reflected(samples.fine[part.first + k], shares[k]);
+    return true;
+  });
+
+  scratch.points.clear();
+  for (const std::size_t i : scratch.chosen) {
+    const ViewSamples::Part& part = samples.parts[i];
+    scratch.places.clear();
+    for (std::size_t k = part.first_place; k < part.last_place; ++k)
+      scratch.places.push_back(finer_places_[samples.places[k]]);
+    put_on_plane(drawing, samples.fine[part.first], scratch.places, scratch);
+  }
+  scratch.shares.resize(scratch.points.size());
+  const auto for_chosen = [&](const auto& visit) {
+    std::size_t begin = 0;
+    for (const std::size_t i : scratch.chosen) {
+      const ViewSamples::Part& part = samples.parts[i];
+      visit(part, begin, part.last_place - part.first_place);
+      begin += part.last_place - part.first_place;
+    }
+  };
+  for_chosen([&](const ViewSamples::Part& part, std::size_t begin, std::size_t size) {
+    seen.find_shares(part.surface, {&scratch.points[begin], size}, {&scratch.shares[begin], size}, scratch.rays);
+  });
+  seen.trace(scratch.rays);
+  for_chosen([&](const ViewSamples::Part& part, std::size_t begin, std::size_t size) {
+    const float mean =
+        std::accumulate(&scratch.shares[begin], &scratch.shares[begin] + size, 0.f) / static_cast<float>(size);
+    for (std::size_t k = part.first; k < part.last && mean > 0; ++k)
+      sun[samples.fine[k].pixel - row * width] += seen.reflected(samples.fine[k], mean);
+  });
+}
+
+void FrameRenderer::add_to_panes(const Drawing& drawing, std::size_t beam, int row, Scratch& scratch,
+                                 glm::vec3* sun) const {
+  const ViewSamples::Row& samples = samples_->rows[row];
+  const SeenBeam& seen = drawing.beams[beam];
+  for (const BeamGroup& group : samples.pane_groups) {
+    if (!seen.may_light(group)) continue;
+    const std::span<const BeamPoint> points(&samples.on_panes[group.first], group.last - group.first);
+    scratch.shares.resize(points.size());
+    seen.find_shares(group.surface, points, scratch.shares, scratch.rays);
+    seen.trace(scratch.rays);
+    for (std::size_t k = 0; k < points.size(); ++k)
+      if (scratch.shares[k] > 0)
+        sun[points[k].pixel - row * samples_->view.width] += seen.reflected(points[k], scratch.shares[k]);
+  }
+}
+
+}  // namespace transom
