@@ -41,7 +41,8 @@ class RayScene {
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
 
-  /// First hit of every ray. `hits` has the size of `rays`.
+  /// First hit of every ray. `hits` has the size of `rays`. A hit depends on the ray and on the faces at its place
+  /// alone, even where several meet there: not on other rays, nor on faces elsewhere.
   void intersect(What what, std::span<const Ray> rays, std::span<Hit> hits, Order order = Order::kScattered) const;
 
   /// 1 where something opaque (or of `what`) lies between t_near and t_far, else 0.
@@ -60,6 +61,8 @@ class RayScene {
 
  private:
   struct Tree;
+  struct Meeting;
+  void settle(const Tree& tree, const Ray& ray, Hit& hit) const;
   const Faces& faces_;
   const std::vector<Material>& materials_;
   const std::vector<OpeningGroup>& openings_;
