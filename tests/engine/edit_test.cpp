@@ -16,9 +16,9 @@ using test::uniform_sky;
 
 SolveOptions options() {
   SolveOptions options;
-  options.target_patch_count = 500;
-  options.patch_samples = {256, 128};
-  options.node_samples = {256, 128};
+  options.target_patch_count = 300;
+  options.patch_samples = options.node_samples = {256, 64};
+  options.node_tolerance = 0.15f;
   return options;
 }
 
