@@ -300,6 +300,8 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
     node_through_.append(row.through);
     std::vector<Share> patches = row.reached;
     patches.insert(patches.end(), row.through.begin(), row.through.end());
+    std::inplace_merge(patches.begin(), patches.begin() + static_cast<std::ptrdiff_t>(row.reached.size()),
+                       patches.end(), [](const Share& a, const Share& b) { return a.index < b.index; });
     merge_shares(patches);
     all.append(patches);
   }
