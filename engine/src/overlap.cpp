@@ -117,8 +117,10 @@ void set_back_contacts(Faces& all) {
   };
   const auto gives_way = [&](const Face& face, const Face& other) {
     if (!is_solid(other) || face.area != other.area) return !is_solid(other) || face.area < other.area;
-    return std::lexicographical_compare(&face.corner[0].x, &face.corner[0].x + 12, &other.corner[0].x,
-                                        &other.corner[0].x + 12);
+    for (int k = 0; k < 4; ++k)
+      for (int axis = 0; axis < 3; ++axis)
+        if (face.corner[k][axis] != other.corner[k][axis]) return face.corner[k][axis] < other.corner[k][axis];
+    return false;
   };
   std::vector<char> is_set_back(count, 0);
   parallel_indices(count, 64, [&](std::size_t f) {

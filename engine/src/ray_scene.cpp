@@ -104,9 +104,9 @@ struct RayScene::Meeting {
   const Faces& faces;
   const Tree& tree;
   const Ray& ray;
-  float t;
-  Hit hit;  // face -1: none so far
-  bool is_inside = false;
+  float t;                 // about where
+  Hit hit;                 // face -1: none so far
+  bool is_inside = false;  // of its triangle, and not at an edge
   Triangle place{};
 
   void consider(unsigned triangle) {
