@@ -249,7 +249,7 @@ bool Gatherer::gather_again(const OriginOf& origin_of, const Node& middle, float
   const std::size_t per_cell = order.size() / is_met.size();
   for (std::size_t begin = 0; begin < order.size(); begin += per_cell) {
     const glm::ivec2 cell = points.cell2(order[begin], cells.bits());
-    if (!is_met[static_cast<std::size_t>(cell.y * cells.per_axis() + cell.x)]) continue;
+    if (!is_met[cell.y * cells.per_axis() + cell.x]) continue;
     for (std::size_t k = begin; k < begin + per_cell; ++k) {
       if (order[k] >= static_cast<std::uint32_t>(count)) continue;
       // A point needs no place on it.
