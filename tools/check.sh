@@ -71,7 +71,7 @@ check "engine tests" ctest --preset release
 if [ "$mode" = all ]; then
     check "Python tests" "$bin/pytest"
     check "clang-tidy" clang_tidy
-    for preset in asan ubsan tsan; do
+    for preset in asan tsan; do
         check "$preset" sanitizer "$preset"
     done
     check "wheel" wheel

@@ -50,7 +50,7 @@ void Engine::solve(const Engine* solved) {
         choose_edges(faces_, is_indoors, options_.maximum_edge_m, options_.outdoor_edge_m, options_.target_patch_count);
     facts_.maximum_edge_m = *std::min_element(edges.begin(), edges.end());
     facts_.outdoor_edge_m = *std::max_element(edges.begin(), edges.end());
-    mesh_ = std::make_unique<LightMesh>(faces_, edges, options_.elements_per_edge, clusters(edges));
+    mesh_ = std::make_unique<LightMesh>(faces_, edges, options_.elements_per_edge, clusters(edges, is_indoors));
     panels_ = std::make_unique<Panels>(faces_, scene_.materials, scene_.openings);
     gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_, *panels_);
     const float element_edge = facts_.maximum_edge_m / static_cast<float>(options_.elements_per_edge);
@@ -98,9 +98,13 @@ void Engine::solve(const Engine* solved) {
 }
 
 // Small faces taken together, where each for itself would be too many.
-FaceClusters Engine::clusters(const std::vector<float>& edges) const {
+FaceClusters Engine::clusters(const std::vector<float>& edges, const std::vector<char>& is_indoors) const {
   const std::vector<char> is_small = find_small_faces(faces_, scene_.materials, edges, options_.target_patch_count);
-  return {faces_, is_small, facts_.maximum_edge_m, options_.target_patch_count / 2,
+  return {faces_,
+          is_small,
+          is_indoors,
+          facts_.maximum_edge_m,
+          options_.target_patch_count / 2,
           options_.elements_per_edge * options_.elements_per_edge};
 }
 

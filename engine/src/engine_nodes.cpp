@@ -187,7 +187,7 @@ void Engine::resolve_near_light(const NodeTrial& trial) {
     for (const Share& share : trial.rows[i].near) {
       const int patch = patch_of_slot_[share.index / per_slot];
       if (patch < 0) continue;
-      const NodeShares& nodes = at_element[static_cast<std::size_t>(patch * per_slot + share.index % per_slot)];
+      const NodeShares& nodes = at_element[patch * per_slot + share.index % per_slot];
       if (nodes.count == 0) continue;
       for (int k = 0; k < nodes.count; ++k) rows[i].push_back({nodes.node[k], share.weight * nodes.weight[k]});
       rows[i].push_back({static_cast<int>(node_count) + patch, -share.weight});
@@ -300,6 +300,8 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
     node_through_.append(row.through);
     std::vector<Share> patches = row.reached;
     patches.insert(patches.end(), row.through.begin(), row.through.end());
+    std::inplace_merge(patches.begin(), patches.begin() + static_cast<std::ptrdiff_t>(row.reached.size()),
+                       patches.end(), [](const Share& a, const Share& b) { return a.index < b.index; });
     merge_shares(patches);
     all.append(patches);
   }

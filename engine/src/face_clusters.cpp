@@ -47,6 +47,7 @@ std::uint64_t spread_bits(std::uint64_t x) {
 
 // Cubes of one size laid over the scene.
 struct Cubes {
+  const std::vector<char>& is_indoors;
   glm::vec3 low;
   float edge;
 
@@ -55,6 +56,7 @@ struct Cubes {
     const Face& face = faces.faces[side / 2];
     const glm::vec3 place = (middle_of(face) - low) / edge;
     std::uint64_t key = static_cast<std::uint64_t>(face.material) * 2 + faces.is_inside_solid(side / 2, side % 2);
+    key = key * 2 + static_cast<std::uint64_t>(is_indoors[side / 2] >> side % 2 & 1);
     key = key * 6 + static_cast<std::uint64_t>(main_direction(normal_of(faces, side)));
     for (int axis = 0; axis < 3; ++axis)
       key = key * kCubesPerAxis + std::min(kCubesPerAxis - 1, static_cast<std::uint64_t>(std::max(0.f, place[axis])));
@@ -72,10 +74,10 @@ struct Cubes {
 
 }  // namespace
 
-FaceClusters::FaceClusters(const Faces& faces, const std::vector<char>& is_small, float cube_m, int largest_count,
-                           int elements)
+FaceClusters::FaceClusters(const Faces& faces, const std::vector<char>& is_small, const std::vector<char>& is_indoors,
+                           float cube_m, int largest_count, int elements)
     : per_cluster_(elements) {
-  find_clusters(faces, is_small, cube_m, largest_count);
+  find_clusters(faces, is_small, is_indoors, cube_m, largest_count);
   if (sides_.empty()) return;
   element_of_side_.assign(2 * faces.faces.size(), 0);
   area_.resize(static_cast<std::size_t>(count()));
@@ -90,13 +92,13 @@ FaceClusters::FaceClusters(const Faces& faces, const std::vector<char>& is_small
                    [&](std::size_t c) { find_elements(faces, static_cast<int>(c)); });
 }
 
-void FaceClusters::find_clusters(const Faces& faces, const std::vector<char>& is_small, float cube_m,
-                                 int largest_count) {
+void FaceClusters::find_clusters(const Faces& faces, const std::vector<char>& is_small,
+                                 const std::vector<char>& is_indoors, float cube_m, int largest_count) {
   for (std::size_t f = 0; f < is_small.size(); ++f)
     if (is_small[f]) sides_.insert(sides_.end(), {static_cast<int>(2 * f), static_cast<int>(2 * f + 1)});
   if (sides_.empty()) return;
   const float least = faces.extent / static_cast<float>(kCubesPerAxis);
-  Cubes cubes{glm::vec3(-0.5f * faces.extent), std::max(cube_m, least)};
+  Cubes cubes{is_indoors, glm::vec3(-0.5f * faces.extent), std::max(cube_m, least)};
   std::unordered_set<std::uint64_t> keys;
   for (;; cubes.edge *= kCubeGrowth) {
     keys.clear();

@@ -21,7 +21,8 @@ constexpr float kPi = std::numbers::pi_v<float>;
 }  // namespace
 
 void merge_shares(std::vector<Share>& shares) {
-  std::sort(shares.begin(), shares.end(), [](const Share& a, const Share& b) { return a.index < b.index; });
+  const auto is_before = [](const Share& a, const Share& b) { return a.index < b.index; };
+  if (!std::is_sorted(shares.begin(), shares.end(), is_before)) std::sort(shares.begin(), shares.end(), is_before);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < shares.size(); ++i) {
     if (kept > 0 && shares[kept - 1].index == shares[i].index)
@@ -248,10 +249,11 @@ bool Gatherer::gather_again(const OriginOf& origin_of, const Node& middle, float
   const std::size_t per_cell = order.size() / is_met.size();
   for (std::size_t begin = 0; begin < order.size(); begin += per_cell) {
     const glm::ivec2 cell = points.cell2(order[begin], cells.bits());
-    if (!is_met[static_cast<std::size_t>(cell.y * cells.per_axis() + cell.x)]) continue;
+    if (!is_met[cell.y * cells.per_axis() + cell.x]) continue;
     for (std::size_t k = begin; k < begin + per_cell; ++k) {
       if (order[k] >= static_cast<std::uint32_t>(count)) continue;
-      const glm::vec4 u = points.point4(order[k]);
+      // A point needs no place on it.
+      const glm::vec4 u = radius > 0 ? points.point4(order[k]) : glm::vec4(points.point2(order[k]), 0, 0);
       const Origin origin = origin_of(glm::vec2(u.z, u.w));
       const Ray ray{origin.position, frame_from_normal(origin.normal) * sample_cosine_hemisphere({u.x, u.y})};
       if (change.may_meet(ray)) rays.push_back(ray);

@@ -8,6 +8,7 @@
 
 #include "transom/error.h"
 #include "transom/face_pieces.h"
+#include "transom/overlap.h"
 #include "transom/parallel.h"
 
 namespace transom {
@@ -248,6 +249,7 @@ Faces make_faces(const SceneGeometry& scene) {
     }
   }
   mark_solids(scene, result);
+  set_back_contacts(result);
   return result;
 }
 

@@ -60,6 +60,18 @@ double overlap_area(const Face& face, const Face& other, glm::dvec3& middle) {
   return 0.5 * glm::length(twice_area);
 }
 
+// Whether two faces lie in one plane and on each other; then also the area and the middle of what they share.
+bool lie_on_each_other(const Faces& faces, int a, int b, double& area, glm::dvec3& middle) {
+  const Face &first = faces.faces[a], &second = faces.faces[b];
+  if (std::abs(glm::dot(first.normal, second.normal)) < kParallelCosine) return false;
+  const auto off_plane = [&](glm::vec3 p) { return std::abs(glm::dot(p - first.corner[0], first.normal)); };
+  if (std::max({off_plane(second.corner[0]), off_plane(second.corner[1]),
+                off_plane(second.corner[corner_count(second) - 1])}) > faces.ray_offset())
+    return false;
+  area = overlap_area(second, first, middle);
+  return area > kLeastShare * std::min(first.area, second.area);
+}
+
 // Whether a place between two faces that lie on each other sees a lit side indoors, to the front or the back of one.
 bool is_lit(const Faces& faces, const std::vector<char>& is_indoors, const RayScene& rays, glm::vec3 place,
             glm::vec3 normal) {
@@ -85,22 +97,45 @@ bool is_lit(const Faces& faces, const std::vector<char>& is_indoors, const RaySc
 // Area and middle of what two faces in one plane share, where light meets it; 0: they do not lie on each other.
 double lit_overlap(const Faces& faces, const std::vector<char>& is_indoors, const RayScene& rays, int a, int b,
                    glm::dvec3& middle) {
-  const float margin = faces.ray_offset();
   const Face &first = faces.faces[a], &second = faces.faces[b];
+  double area = 0;
   if (first.source == second.source || !(is_indoors[a] || is_indoors[b]) ||
-      std::abs(glm::dot(first.normal, second.normal)) < kParallelCosine)
-    return 0;
-  const auto off_plane = [&](glm::vec3 p) { return std::abs(glm::dot(p - first.corner[0], first.normal)); };
-  if (std::max({off_plane(second.corner[0]), off_plane(second.corner[1]),
-                off_plane(second.corner[corner_count(second) - 1])}) > margin)
-    return 0;
-  const double area = overlap_area(second, first, middle);
-  if (area <= std::max(kLeastShare * std::min(first.area, second.area), kLeastExtent2 * faces.extent * faces.extent))
+      !lie_on_each_other(faces, a, b, area, middle) || area <= kLeastExtent2 * faces.extent * faces.extent)
     return 0;
   return is_lit(faces, is_indoors, rays, glm::vec3(middle), first.normal) ? area : 0;
 }
 
 }  // namespace
+
+void set_back_contacts(Faces& all) {
+  const std::size_t count = all.faces.size();
+  std::vector<Box> boxes(count);
+  for (std::size_t f = 0; f < count; ++f) boxes[f] = box_of(all.faces[f], 0.5f * all.ray_offset());
+  const BoxTree tree(boxes);
+  const auto is_solid = [&](const Face& face) {
+    return all.component_is_solid[static_cast<std::size_t>(face.component)] != 0;
+  };
+  const auto gives_way = [&](const Face& face, const Face& other) {
+    if (!is_solid(other) || face.area != other.area) return !is_solid(other) || face.area < other.area;
+    for (int k = 0; k < 4; ++k)
+      for (int axis = 0; axis < 3; ++axis)
+        if (face.corner[k][axis] != other.corner[k][axis]) return face.corner[k][axis] < other.corner[k][axis];
+    return false;
+  };
+  std::vector<char> is_set_back(count, 0);
+  parallel_indices(count, 64, [&](std::size_t f) {
+    const Face& face = all.faces[f];
+    if (!is_solid(face)) return;
+    tree.visit(boxes[f], [&](int other) {
+      double area = 0;
+      glm::dvec3 middle(0);
+      if (!is_set_back[f] && all.faces[other].component != face.component && gives_way(face, all.faces[other]) &&
+          lie_on_each_other(all, static_cast<int>(f), other, area, middle))
+        is_set_back[f] = 1;
+    });
+  });
+  for (std::size_t f = 0; f < count; ++f) all.faces[f].is_set_back = is_set_back[f] != 0;
+}
 
 void check_overlaps(const Faces& faces, const std::vector<char>& is_indoors, const RayScene& rays) {
   const float margin = faces.ray_offset();

@@ -1,6 +1,7 @@
 #include "transom/ray_scene.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "embree_device.h"
 #include "transom/error.h"
@@ -9,6 +10,8 @@ namespace transom {
 namespace {
 
 constexpr std::size_t kWidth = 16;
+constexpr float kMeeting = 0.1f;  // of the lift of ray origins: faces so near to each other meet
+constexpr float kSetBack = 0.4f;  // of the same: by which faces lie deeper in their solid that are set back
 
 // Embree 3 takes a context, Embree 4 optional arguments.
 #if TRANSOM_EMBREE_MAJOR >= 4
@@ -67,16 +70,98 @@ void forget_hits(RTCHit16& hit) {
   }
 }
 
+struct Triangle {
+  glm::vec3 a, b, c;
+};
+
+// As rays meet it.
+Triangle triangle_of(const Faces& faces, const Face& face, int part) {
+  const glm::vec3 offset = (face.is_set_back ? -kSetBack * faces.ray_offset() : 0.f) * face.normal;
+  return {face.corner[0] + offset, face.corner[1 + part] + offset, face.corner[2 + part] + offset};
+}
+
+// Whether a triangle comes before another by its place: an order that knows no numbers.
+bool is_before(const Triangle& s, const Triangle& t) {
+  for (const auto corner : {&Triangle::a, &Triangle::b, &Triangle::c})
+    for (int axis = 0; axis < 3; ++axis)
+      if ((s.*corner)[axis] != (t.*corner)[axis]) return (s.*corner)[axis] < (t.*corner)[axis];
+  return false;
+}
+
+// The largest barycentric coordinate of places no farther than `distance` from an edge.
+float edge_share(const Triangle& t, float distance) {
+  const float longest = std::max({glm::length(t.b - t.a), glm::length(t.c - t.b), glm::length(t.a - t.c)});
+  return distance * longest / glm::length(glm::cross(t.b - t.a, t.c - t.a));
+}
+
 }  // namespace
 
 struct RayScene::Tree {
   RTCScene scene = nullptr;
   std::vector<int> face_of_triangle;
   std::vector<std::uint8_t> part_of_triangle;  // 0: corners a, b, c; 1: corners a, c, d
+  std::vector<float> edge_share;               // barycentric coordinate below which a hit is at an edge of its triangle
   ~Tree() {
     if (scene) rtcReleaseScene(scene);
   }
 };
+
+// All triangles that a ray meets at one place, and of them the one that it is said to have met.
+struct RayScene::Meeting {
+  const Faces& faces;
+  const Tree& tree;
+  const Ray& ray;
+  float t;                 // about where
+  Hit hit;                 // face -1: none so far
+  bool is_inside = false;  // of its triangle, and not at an edge
+  Triangle place{};
+
+  void consider(unsigned triangle) {
+    const int face_index = tree.face_of_triangle[triangle], part = tree.part_of_triangle[triangle];
+    const Face& face = faces.faces[static_cast<std::size_t>(face_index)];
+    const Triangle own = triangle_of(faces, face, part);
+    const double tolerance = kMeeting * faces.ray_offset();
+    const glm::dvec3 a(own.a), ab = glm::dvec3(own.b) - a, ac = glm::dvec3(own.c) - a, direction(ray.direction);
+    const glm::dvec3 normal = glm::cross(ab, ac);
+    const double facing = glm::dot(normal, direction), twice_area = glm::length(normal);
+    if (facing == 0 || !(twice_area > 0)) return;
+    const double distance = glm::dot(normal, a - glm::dvec3(ray.origin)) / facing;
+    if (distance < ray.t_near || distance > ray.t_far || std::abs(distance - t) * glm::length(direction) > tolerance)
+      return;
+    const glm::dvec3 from_a = glm::dvec3(ray.origin) + distance * direction - a;
+    const double of_b = glm::dot(glm::cross(from_a, ac), normal) / (twice_area * twice_area),
+                 of_c = glm::dot(glm::cross(ab, from_a), normal) / (twice_area * twice_area);
+    const double depth = twice_area * std::min({(1 - of_b - of_c) / glm::length(ac - ab), of_b / glm::length(ac),
+                                                of_c / glm::length(ab)});  // within the nearest edge
+    if (depth < -tolerance) return;
+    const bool is_own_inside = depth > tolerance;
+    if (hit.face >= 0 && (is_own_inside != is_inside ? is_inside : !is_before(own, place))) return;
+    is_inside = is_own_inside;
+    place = own;
+    hit.face = face_index;
+    hit.side = glm::dot(ray.direction, face.normal) < 0 ? 0 : 1;
+    hit.t = static_cast<float>(distance);
+    const auto v = static_cast<float>(std::clamp(of_c, 0.0, 1.0));
+    hit.st = face.parameters(part, {std::clamp(static_cast<float>(of_b), 0.f, 1 - v), v});
+  }
+};
+
+// Where faces meet, it hangs on how the tree happens to be built which of them is hit first, and in a tree of other
+// faces it may be another. The ray is said to meet the triangle that it meets inside, as of a floor at the edge of what
+// stands on it, or else the first by place.
+void RayScene::settle(const Tree& tree, const Ray& ray, Hit& hit) const {
+  Meeting meeting{faces_, tree, ray, hit.t, {}};
+  const glm::vec3 place = ray.origin + hit.t * ray.direction;
+  RTCPointQuery query{place.x, place.y, place.z, 0, 2 * kMeeting * faces_.ray_offset()};
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  const auto consider = [](RTCPointQueryFunctionArguments* found) {
+    static_cast<Meeting*>(found->userPtr)->consider(found->primID);
+    return false;  // the radius stays
+  };
+  rtcPointQuery(tree.scene, &query, &context, consider, &meeting);
+  if (meeting.hit.face >= 0) hit = meeting.hit;
+}
 
 RayScene::RayScene(const Faces& faces, const std::vector<Material>& materials,
                    const std::vector<OpeningGroup>& openings)
@@ -90,9 +175,11 @@ RayScene::RayScene(const Faces& faces, const std::vector<Material>& materials,
       has_openings_ |= is_opening;
       if (what != What::kAll && is_opening != (what == What::kOpenings)) continue;
       for (int part = 0; part < (face.is_quad ? 2 : 1); ++part) {
-        corners.insert(corners.end(), {face.corner[0], face.corner[1 + part], face.corner[2 + part]});
+        const Triangle own = triangle_of(faces, face, part);
+        corners.insert(corners.end(), {own.a, own.b, own.c});
         tree->face_of_triangle.push_back(static_cast<int>(f));
         tree->part_of_triangle.push_back(static_cast<std::uint8_t>(part));
+        tree->edge_share.push_back(edge_share(own, kMeeting * faces.ray_offset()));
       }
     }
     tree->scene = rtcNewScene(shared_device());
@@ -131,7 +218,7 @@ void RayScene::intersect(What what, std::span<const Ray> rays, std::span<Hit> hi
       hits[begin + i] = packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID
                             ? Hit{}
                             : hit_of(tree, packet.hit.primID[i], {packet.hit.u[i], packet.hit.v[i]}, packet.ray.tfar[i],
-                                     rays[begin + i].direction);
+                                     rays[begin + i]);
   }
 }
 
@@ -158,15 +245,20 @@ void RayScene::intersect_from(glm::vec3 origin, const float* x, const float* y, 
       hits[begin + i] = packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID
                             ? Hit{}
                             : hit_of(tree, packet.hit.primID[i], {packet.hit.u[i], packet.hit.v[i]}, packet.ray.tfar[i],
-                                     {x[begin + i], y[begin + i], z[begin + i]});
+                                     {origin, {x[begin + i], y[begin + i], z[begin + i]}});
   }
 }
 
-Hit RayScene::hit_of(const Tree& tree, unsigned triangle, glm::vec2 barycentric, float t, glm::vec3 direction) const {
-  const int index = tree.face_of_triangle[triangle];
-  const Face& face = faces_.faces[static_cast<std::size_t>(index)];
-  return {index, glm::dot(direction, face.normal) < 0 ? 0 : 1, t,
-          face.parameters(tree.part_of_triangle[triangle], barycentric)};
+Hit RayScene::hit_of(const Tree& tree, unsigned triangle, glm::vec2 barycentric, float t, const Ray& ray) const {
+  Hit hit;
+  hit.face = tree.face_of_triangle[triangle];
+  const Face& face = faces_.faces[static_cast<std::size_t>(hit.face)];
+  hit.side = glm::dot(ray.direction, face.normal) < 0 ? 0 : 1;
+  hit.t = t;
+  hit.st = face.parameters(tree.part_of_triangle[triangle], barycentric);
+  const float u = barycentric.x, v = barycentric.y;
+  if (std::min({u, v, 1 - u - v}) < tree.edge_share[triangle]) settle(tree, ray, hit);
+  return hit;
 }
 
 void RayScene::occluded(What what, std::span<const Ray> rays, std::span<std::uint8_t> blocked, Order order) const {

@@ -27,7 +27,7 @@ std::uint64_t place_hash(const Face& face) {
 }
 
 bool is_same_place(const Face& f, const Face& g) {
-  return f.is_quad == g.is_quad && std::equal(f.corner, f.corner + 4, g.corner) &&
+  return f.is_quad == g.is_quad && f.is_set_back == g.is_set_back && std::equal(f.corner, f.corner + 4, g.corner) &&
          std::equal(f.corner_normal, f.corner_normal + 4, g.corner_normal);
 }
 

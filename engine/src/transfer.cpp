@@ -16,9 +16,11 @@ constexpr int kMaximumScalings = 100;
 constexpr int kPlainScalings = 12;  // before Newton's method, which is costly where it is far from the solution
 constexpr std::size_t kGrain = 64;  // rows at once
 constexpr double kRowSumTolerance = 1e-7;
-constexpr double kLargestStep = 1.0;  // of a logarithm of a scale
+constexpr double kLargestStep = 3.0;  // of a logarithm of a scale: those of patches in gaps are far off at first
 constexpr int kMaximumGradientSteps = 300;
-constexpr double kGradientTolerance = 1e-3;  // relative: Newton's method needs no more
+constexpr double kGradientTolerance = 1e-3;  // relative: Newton's method needs no more,
+constexpr double kFarTolerance = 0.1;        // and this where its steps are long
+constexpr double kFarRowSum = 1e-3;
 
 constexpr std::size_t kRowsAtOnce = 64;
 
@@ -95,10 +97,21 @@ SparseRows average_both_ways(const SparseRows& exchange, const std::vector<float
   return result;
 }
 
+// Row i times x, in four sums that do not wait for each other.
+double row_product(const SparseRows& rows, std::size_t i, const std::vector<double>& x) {
+  const Share *entry = rows.entries.data() + rows.begin[i], *last = rows.entries.data() + rows.begin[i + 1];
+  const auto term = [&](int k) { return static_cast<double>(entry[k].weight) * x[entry[k].index]; };
+  double sum[4]{};
+  for (; last - entry >= 4; entry += 4)
+    for (int k = 0; k < 4; ++k) sum[k] += term(k);
+  for (; entry != last; ++entry) sum[0] += term(0);
+  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
 // Conjugate gradients with the diagonal as preconditioner, for a positive (semi-)definite operator.
 template <typename Operator>
 void solve_positive_definite(const Operator& apply, const std::vector<double>& diagonal,
-                             const std::vector<double>& right, std::vector<double>& x) {
+                             const std::vector<double>& right, double tolerance, std::vector<double>& x) {
   const std::size_t n = right.size();
   std::vector<double> r = right, z(n), p(n), q(n);
   std::fill(x.begin(), x.end(), 0.0);
@@ -111,7 +124,7 @@ void solve_positive_definite(const Operator& apply, const std::vector<double>& d
     return product;
   };
   double rho = precondition();
-  const double target = kGradientTolerance * kGradientTolerance * rho;
+  const double target = tolerance * tolerance * rho;
   p = z;
   for (int step = 0; step < kMaximumGradientSteps && rho > target; ++step) {
     apply(p, q);
@@ -160,20 +173,10 @@ TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<floa
   });
   SparseRows exchange = average_both_ways(form_factors, areas, defects.raw_reciprocity);
 
-  std::vector<double> scale(n, 1.0), sum(n, 0.0), residual(n), step(n);
-  // Row i of diag(scale) S diag(scale), times x.
-  const auto scaled_product = [&](std::size_t i, const std::vector<double>& x) {
-    double row = 0;
-    for (std::size_t k = exchange.begin[i]; k < exchange.begin[i + 1]; ++k) {
-      const Share& entry = exchange.entries[k];
-      row += static_cast<double>(entry.weight) * scale[entry.index] * x[entry.index];
-    }
-    return scale[i] * row;
-  };
-  const std::vector<double> ones(n, 1.0);
+  std::vector<double> scale(n, 1.0), sum(n, 0.0), residual(n), step(n), scaled(n);
   const auto worst_row_sum = [&] {
     double worst = 0;
-    parallel_indices(n, kGrain, [&](std::size_t i) { sum[i] = scaled_product(i, ones); });
+    parallel_indices(n, kGrain, [&](std::size_t i) { sum[i] = scale[i] * row_product(exchange, i, scale); });
     for (std::size_t i = 0; i < n; ++i) {
       residual[i] = sum[i] > 0 ? areas[i] * static_cast<double>(row_sums[i]) - sum[i] : 0;
       if (sum[i] > 0) worst = std::max(worst, std::abs(residual[i]) / areas[i]);
@@ -190,14 +193,13 @@ TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<floa
     // Newton's step for the logarithms of the scales: (diag(sum) + D S D) step = residual, by conjugate gradients.
     solve_positive_definite(
         [&](const std::vector<double>& x, std::vector<double>& y) {
-          parallel_indices(n, kGrain,
-                           [&](std::size_t i) { y[i] = sum[i] > 0 ? sum[i] * x[i] + scaled_product(i, x) : x[i]; });
+          for (std::size_t i = 0; i < n; ++i) scaled[i] = scale[i] * x[i];
+          parallel_indices(n, kGrain, [&](std::size_t i) {
+            y[i] = sum[i] > 0 ? sum[i] * x[i] + scale[i] * row_product(exchange, i, scaled) : x[i];
+          });
         },
-        sum, residual, step);
-    double largest = 0;
-    for (const double s : step) largest = std::max(largest, std::abs(s));
-    const double damping = largest > kLargestStep ? kLargestStep / largest : 1.0;
-    for (std::size_t i = 0; i < n; ++i) scale[i] *= std::exp(damping * step[i]);
+        sum, residual, defects.row_sum > kFarRowSum ? kFarTolerance : kGradientTolerance, step);
+    for (std::size_t i = 0; i < n; ++i) scale[i] *= std::exp(std::clamp(step[i], -kLargestStep, kLargestStep));
     defects.row_sum = worst_row_sum();
   }
 

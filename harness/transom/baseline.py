@@ -34,6 +34,10 @@ KEPT_CHANGES = 12
 SEED_QUANTITIES = {"baseline_percent": "baseline_seed_percent"}
 """What is judged with a tolerance of its own when another seed than the blessed one was used."""
 
+CHANCE_SPREAD = 0.5
+"""A triangle whose light spreads over the seeds by more than this share of its mean is found by some of them only: it
+lies outdoors, where no room sees it, as the outer side of a window's frame does."""
+
 LEAST_REASON = 10
 """Characters that a reason has at least."""
 
@@ -246,6 +250,8 @@ def drifts(blessed: BlessedCase, now: Measured, *, fresh_seed: bool) -> list[Dri
         if before is None or after is None:
             found = (before.value if before else None, after.value if after else None)
             rows.append(Drift(*place, *name, *found, math.nan, 0.0, 0, None))
+        elif before.category == UP_CLOSE and before.spread > CHANCE_SPREAD * abs(before.mean):
+            continue  # in the sun or in the dark by whether a ray outdoors has found it: no room has light from it
         elif fresh_seed and before.category == UP_CLOSE and before.spread == 0:
             continue  # a buried face, dark by every blessed seed: one of its few rays by chance would light it
         elif fresh_seed:

@@ -23,8 +23,7 @@ from transom.bench_scenes import (
     beam_count,
     has_changeable_product,
     opening_face_count,
-    with_other_glass,
-    with_other_paint,
+    scene_edits,
     with_other_product,
     with_panes,
 )
@@ -59,6 +58,9 @@ QuantityName = Literal[
     "reglaze",
     "new_product",
     "recolour",
+    "move_object",
+    "add_object",
+    "remove_object",
     "relight_hour",
     "relight_sky",
     "relight_overcast",
@@ -70,7 +72,8 @@ QuantityName = Literal[
 
 NOTES = (
     "reglaze and recolour are edits: another transmittance of every pane, or another reflectance of the first opaque "
-    "material, in a scene that is solved, and a relighting; the answer is that of a fresh solve, bit by bit",
+    "material, in a scene that is solved, and a relighting; the answer is that of a fresh solve, bit by bit; so are "
+    "move_object, add_object and remove_object, of the largest closed object that stands free of panes",
     "relight_sky changes the sky alone and keeps the sun; the engine does all the work of a new hour",
     "beams are the sun and every lobe of a product that it shines on; relight_overcast has none",
     "load reads the scene's files; with solve and relight_hour it is what the paper sets against 86 s to set up a "
@@ -236,6 +239,7 @@ def measure_point(name: str, point: Point, budget_s: float, glazings: Sequence[s
     view = resized(scene.views[0], *FRAME_SIZE)
     rows: list[Measurement] = []
     state: dict[str, Engine] = {}
+    edits = scene_edits(scene)
 
     def add(
         quantity: QuantityName,
@@ -254,9 +258,7 @@ def measure_point(name: str, point: Point, budget_s: float, glazings: Sequence[s
             seen = len(state["engine"].trace()) if "engine" in state else 0
             action(index)
             spans = state["engine"].trace()
-            phases.append(
-                phase_seconds(spans if quantity in ("solve", "reglaze", "recolour") else spans[seen:], quantity)
-            )
+            phases.append(phase_seconds(spans if quantity == "solve" or quantity in edits else spans[seen:], quantity))
 
         seconds = _repeated(once, share * budget_s, least)
         rows.append(_measurement(quantity, point, seconds, phases, scene, state["engine"], beams, points, size))
@@ -306,16 +308,14 @@ def measure_point(name: str, point: Point, budget_s: float, glazings: Sequence[s
 
         add("new_product", new_product, 0.1, beams=beams)
     elif whole:
-        edits: dict[QuantityName, list[Scene]] = {"recolour": [with_other_paint(scene, share) for share in (0.9, 0.8)]}
-        if scene.openings:
-            edits["reglaze"] = [with_other_glass(scene, share) for share in (0.9, 0.8)]
-        for quantity, edited in edits.items():
+        for name, change in edits.items():
+            solved = engine if change.before is scene else engine.edited(change.before)
 
-            def edit(index: int, scenes: list[Scene] = edited) -> None:
-                state["engine"] = engine.edited(scenes[index % 2])
+            def edit(index: int, solved: Engine = solved, scenes: Sequence[Scene] = change.after) -> None:
+                state["engine"] = solved.edited(scenes[index % len(scenes)])
                 state["engine"].relight(sun[0])
 
-            add(quantity, edit, 0.08, least=1, beams=beams)
+            add(name, edit, 0.06, least=1, beams=beams)
     return PointResult(tuple(rows), limits, used)
 
 

@@ -1,17 +1,78 @@
-"""Variants of a scene for speed sweeps: more panes of the same area, one pane alone, other glass, other products."""
+"""Variants of a scene for speed sweeps: more panes of the same area, one pane alone, other products, edits."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections import Counter
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from transom.daylight.condition import Condition
+from transom.edits import with_object_moved, with_object_removed
 from transom.fenestration.choice import choose_product, is_file
 from transom.fenestration.light import panel_light
 from transom.products import load_product
-from transom.scene.model import Mesh, Opening, Scene
+from transom.scene.model import Float64, Int32, Mesh, Opening, Scene
+
+EditName = Literal["recolour", "reglaze", "move_object", "add_object", "remove_object"]
+
+SHORT_MOVE_M, LONG_MOVE_M = 0.2, 0.3
+"""Of an object, level and towards the middle of the scene, so that its extent stays."""
+
+PANE_CLEARANCE_M = 0.05
+"""Objects nearer to a pane belong to the window."""
+
+LARGEST_SHARE = 0.25
+"""Of the scene's bounding box: a larger object is the building."""
+
+
+@dataclass(frozen=True)
+class SceneEdit:
+    """A scene that is solved, and scenes that it is edited to in turn."""
+
+    before: Scene
+    after: tuple[Scene, ...]
+
+
+def scene_edits(scene: Scene) -> dict[EditName, SceneEdit]:
+    """The edits that are timed, as far as the scene has what they change."""
+    edits: dict[EditName, SceneEdit] = {
+        "recolour": SceneEdit(scene, tuple(with_other_paint(scene, share) for share in (0.9, 0.8)))
+    }
+    if scene.openings:
+        edits["reglaze"] = SceneEdit(scene, tuple(with_other_glass(scene, share) for share in (0.9, 0.8)))
+    name = movable_object(scene)
+    if name is not None:
+        without = with_object_removed(scene, name)
+        edits["move_object"] = SceneEdit(
+            scene,
+            tuple(with_object_moved(scene, name, _inwards(scene, name, by)) for by in (SHORT_MOVE_M, LONG_MOVE_M)),
+        )
+        edits["add_object"] = SceneEdit(without, (scene,))
+        edits["remove_object"] = SceneEdit(scene, (without,))
+    return edits
+
+
+def movable_object(scene: Scene) -> str | None:
+    """The closed object with the largest bounding box that is neither the building nor near a pane, if there is one."""
+    mesh = scene.mesh
+    is_opening = _is_opening(scene)
+    panes = [_box(mesh, mesh.faces[face : face + 1]) for face in np.flatnonzero(is_opening)]
+    whole = _volume(*_box(mesh, mesh.faces))
+    sizes: dict[str, float] = {}
+    for index, name in enumerate(mesh.objects):
+        chosen = mesh.face_object == index
+        if not chosen.any() or is_opening[chosen].any() or not _is_closed(mesh, mesh.faces[chosen]):
+            continue
+        low, high = _box(mesh, mesh.faces[chosen])
+        is_near_pane = any(
+            (low - PANE_CLEARANCE_M <= last).all() and (high + PANE_CLEARANCE_M >= first).all() for first, last in panes
+        )
+        if not is_near_pane and _volume(low, high) <= LARGEST_SHARE * whole:
+            sizes[name] = _volume(low, high)
+    return max(sizes, key=lambda name: sizes[name], default=None)
 
 
 def opening_face_count(scene: Scene) -> int:
@@ -82,6 +143,34 @@ def with_other_paint(scene: Scene, share: float) -> Scene:
     materials = list(scene.materials)
     materials[index] = replace(materials[index], reflectance=(share * red, share * green, share * blue))
     return replace(scene, materials=tuple(materials))
+
+
+def _inwards(scene: Scene, name: str, distance_m: float) -> tuple[float, float, float]:
+    """An offset of an object along x, towards the middle of the scene."""
+    mesh = scene.mesh
+    low, high = _box(mesh, mesh.faces[mesh.face_object == mesh.objects.index(name)])
+    first, last = _box(mesh, mesh.faces)
+    return (distance_m if low[0] + high[0] < first[0] + last[0] else -distance_m, 0.0, 0.0)
+
+
+def _box(mesh: Mesh, faces: Int32) -> tuple[Float64, Float64]:
+    """Least and greatest coordinates (3,) [m]."""
+    points = mesh.vertices[faces[faces >= 0]]
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _volume(low: Float64, high: Float64) -> float:
+    return float(np.prod(high - low))
+
+
+def _is_closed(mesh: Mesh, faces: Int32) -> bool:
+    """Whether every edge is met by as many faces one way as the other, and encloses something."""
+    edges: Counter[tuple[bytes, bytes]] = Counter()
+    for face in faces:
+        corners = [mesh.vertices[corner].round(6).tobytes() for corner in face if corner >= 0]
+        for start, end in zip(corners, [*corners[1:], corners[0]], strict=True):
+            edges[min(start, end), max(start, end)] += 1 if start < end else -1
+    return not any(edges.values()) and _volume(*_box(mesh, faces)) > 0
 
 
 def _is_opening(scene: Scene) -> NDArray[np.bool_]:

@@ -158,3 +158,13 @@ def test_buried_faces_are_told_by_the_blessed_seed_alone(tmp_path: Path) -> None
     baseline = blessed(tmp_path, [dark], [dark])
     assert compared(baseline, [lit], fresh_seed=True) == []
     assert len(failed(compared(baseline, [lit]))) == 1
+
+
+def test_faces_that_some_seeds_alone_find_are_not_compared(tmp_path: Path) -> None:
+    """The outer side of a frame: in full sun by one seed of sixteen, in the dark by the others."""
+    sunny = [relative(UP_CLOSE, "frame", value, 9.0) for value in (7.0, 6.5, 53486.0, *[7.5] * 13)]
+    steady = [relative(UP_CLOSE, "sill", value, 900.0) for value in (905.0, 890.0, *[900.0] * 14)]
+    baseline = blessed(tmp_path, *([lit, seen] for lit, seen in zip(sunny, steady, strict=True)))
+    now = [relative(UP_CLOSE, "frame", 53486.0, 9.0), relative(UP_CLOSE, "sill", 1200.0, 900.0)]
+    assert [row.place for row in failed(compared(baseline, now))] == ["sill"]
+    assert [row.place for row in compared(baseline, now, fresh_seed=True)] == ["sill"]

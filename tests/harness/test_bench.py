@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scene_writing import write_scene
+from scene_writing import ROOM_OBJ, write_scene
 
 from transom import machine_limits
 from transom.bench import (
@@ -26,7 +26,9 @@ from transom.bench import (
 from transom.bench_scenes import (
     beam_count,
     has_changeable_product,
+    movable_object,
     opening_face_count,
+    scene_edits,
     with_other_glass,
     with_other_product,
     with_panes,
@@ -46,6 +48,19 @@ from transom.scene.model import Mesh, Scene
 @pytest.fixture
 def room(tmp_path: Path) -> Scene:
     return load_scene(write_scene(tmp_path / "room"))
+
+
+def crate(name: str, low: tuple[float, float, float], size: float, number: int) -> str:
+    """A closed cube as an object of a file whose room has eight vertices, and `number` cubes before this one."""
+    corners = [(low[0] + size * (k & 1), low[1] + size * (k >> 1 & 1), low[2] + size * (k >> 2)) for k in range(8)]
+    quads = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
+    first = 9 + 8 * number
+    lines = [f"v {x} {y} {z}" for x, y, z in corners] + ["usemtl wall"]
+    return "\n".join([f"o {name}", *lines, *("f " + " ".join(str(first + k) for k in quad) for quad in quads), ""])
+
+
+FURNISHED = ROOM_OBJ + crate("crate", (0.5, 2, 0.2), 0.6, 0) + crate("cup", (3, 3, 1), 0.1, 1)
+FURNISHED += crate("latch", (1, 0.02, 1), 0.8, 2)
 
 
 def area(mesh: Mesh, material: int) -> float:
@@ -72,6 +87,23 @@ def test_other_glass_changes_the_transmittance_alone(room: Scene) -> None:
     other = with_other_glass(room, 0.5)
     assert other.openings[0].visible_transmittance == pytest.approx(0.39)
     assert replace(other, openings=room.openings) == room
+
+
+def test_the_object_that_edits_change_is_closed_and_free_of_panes(room: Scene, tmp_path: Path) -> None:
+    assert movable_object(room) is None
+    assert scene_edits(room).keys() == {"recolour", "reglaze"}
+    furnished = load_scene(write_scene(tmp_path / "furnished", obj=FURNISHED))
+    assert movable_object(furnished) == "crate"
+    edits = scene_edits(furnished)
+    for moved in edits["move_object"].after:
+        assert np.ptp(moved.mesh.vertices[moved.mesh.faces], axis=(0, 1)) == pytest.approx([4, 5, 3])
+        assert moved.mesh.vertices[moved.mesh.faces[furnished.mesh.face_object == 2]][..., 0].max() > 1.25
+    assert len(edits["add_object"].before.mesh.faces) == len(furnished.mesh.faces) - 6
+    assert edits["add_object"].after == (furnished,)
+    assert edits["remove_object"].after == (edits["add_object"].before,)
+    (open_crate := FURNISHED.splitlines()).remove("f 9 11 12 10")
+    lidless = load_scene(write_scene(tmp_path / "lidless", obj="\n".join(open_crate)))
+    assert movable_object(lidless) == "cup"
 
 
 def test_sweeps_are_over_patches_and_openings(room: Scene) -> None:
@@ -115,11 +147,13 @@ def test_a_benchmark_that_is_not_built_is_no_limit(monkeypatch: pytest.MonkeyPat
 
 def test_every_quantity_is_measured_with_its_phases(tmp_path: Path) -> None:
     pytest.importorskip("transom._engine", reason="the engine is not built", exc_type=ImportError)
-    folder = write_scene(tmp_path / "room")
+    folder = write_scene(tmp_path / "room", obj=FURNISHED)
     found = measure_point(str(folder), Point("default", target_patches=200), 0.5)
     rows = {row.quantity: row for row in found.measurements}
     expected = {"load", "solve", "reglaze", "recolour", "relight_hour", "relight_sky", "relight_overcast", "frame_rays"}
+    expected |= {"move_object", "add_object", "remove_object"}
     assert expected | {"sensors", "peak_memory"} <= rows.keys()
+    assert {"move_object/nodes", "move_object/links"} <= {phase.name for phase in rows["move_object"].phases}
     assert {"solve/patches", "solve/nodes"} <= {phase.name for phase in rows["solve"].phases}
     relight = rows["relight_hour"]
     assert {"relight_hour/gather", "relight_hour/interreflection"} <= {phase.name for phase in relight.phases}

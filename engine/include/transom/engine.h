@@ -178,7 +178,7 @@ class Engine {
   };
 
   void solve(const Engine* solved);
-  FaceClusters clusters(const std::vector<float>& edges) const;
+  FaceClusters clusters(const std::vector<float>& edges, const std::vector<char>& is_indoors) const;
   int opening_of(int face) const;
   std::vector<int> opening_faces() const;
   Known known_from(const Engine* solved) const;

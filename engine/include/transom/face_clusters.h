@@ -17,13 +17,16 @@ struct ClusterElement {
   float area = 0;       ///< [m²]
 };
 
-/// Sides of faces in clusters: of one material, in one cube of space, nearest to one sense of one axis.
+/// Sides of faces in clusters: of one material, all of them indoors or none, in one cube of space, nearest to one sense
+/// of one axis.
 class FaceClusters {
  public:
   FaceClusters() = default;
-  /// is_small: faces to be taken together. cube_m: least edge of the cubes, which grow until there are at most
-  /// `largest_count` clusters. Each cluster has `elements` parts of about equal area.
-  FaceClusters(const Faces& faces, const std::vector<char>& is_small, float cube_m, int largest_count, int elements);
+  /// is_small: faces to be taken together. is_indoors: of each face the sides that lie indoors, see survey.h. cube_m:
+  /// least edge of the cubes, which grow until there are at most `largest_count` clusters. Each cluster has `elements`
+  /// parts of about equal area.
+  FaceClusters(const Faces& faces, const std::vector<char>& is_small, const std::vector<char>& is_indoors, float cube_m,
+               int largest_count, int elements);
 
   int count() const { return static_cast<int>(begin_.size()) - 1; }
   /// Cluster of a side, or -1; and its element there.
@@ -47,7 +50,8 @@ class FaceClusters {
   int main_side(int cluster) const { return sides_[(begin_[cluster] + begin_[cluster + 1]) / 2]; }
 
  private:
-  void find_clusters(const Faces& faces, const std::vector<char>& is_small, float cube_m, int largest_count);
+  void find_clusters(const Faces& faces, const std::vector<char>& is_small, const std::vector<char>& is_indoors,
+                     float cube_m, int largest_count);
   void find_elements(const Faces& faces, int cluster);
   int sample_between(int cluster, std::size_t first, std::size_t last, float& u) const;
   /// Of the sides of the cluster that begins at `begin`, before side i.

@@ -41,7 +41,8 @@ class RayScene {
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
 
-  /// First hit of every ray. `hits` has the size of `rays`.
+  /// First hit of every ray. `hits` has the size of `rays`. A hit depends on the ray and on the faces at its place
+  /// alone, even where several meet there: not on other rays, nor on faces elsewhere.
   void intersect(What what, std::span<const Ray> rays, std::span<Hit> hits, Order order = Order::kScattered) const;
 
   /// The same of rays from one point, in order; x, y and z: their directions, as many as `hits`.
@@ -64,7 +65,9 @@ class RayScene {
 
  private:
   struct Tree;
-  Hit hit_of(const Tree& tree, unsigned triangle, glm::vec2 barycentric, float t, glm::vec3 direction) const;
+  struct Meeting;
+  Hit hit_of(const Tree& tree, unsigned triangle, glm::vec2 barycentric, float t, const Ray& ray) const;
+  void settle(const Tree& tree, const Ray& ray, Hit& hit) const;
 
   const Faces& faces_;
   const std::vector<Material>& materials_;
