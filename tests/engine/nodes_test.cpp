@@ -1,6 +1,7 @@
 // Where light is gathered to be shown, and what is shown between.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -104,6 +105,24 @@ TEST(Nodes, AreAddedAroundASlabAndNotInTheRestOfTheRoom) {
       if (place.z < 0.4f) (is_near(place) ? added_near : added_far) += sign;
     }
   EXPECT_GT(added_near, 4 * std::abs(added_far));
+}
+
+TEST(Nodes, AreOneWherePartsMeet) {
+  // Walls of a length that no number of cells divides without rounding.
+  SceneGeometry scene = roof_light_room(0.5f);
+  for (glm::dvec3& vertex : scene.vertices) vertex *= glm::dvec3(1.07, 1.13, 0.97);
+  const Engine engine(scene, tregenza(), options(0.06f));
+  const std::span<const Node> nodes = engine.nodes();
+  std::vector<glm::vec3> places;
+  for (const Node& node : nodes) places.push_back(node.position);
+  std::sort(places.begin(), places.end(), [](glm::vec3 a, glm::vec3 b) {
+    return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
+  });
+  int twice = 0;
+  for (std::size_t i = 0; i < places.size(); ++i)
+    for (std::size_t k = i + 1; k < places.size() && places[k].x - places[i].x < 1e-5f; ++k)
+      twice += glm::length(places[k] - places[i]) < 1e-5f;
+  EXPECT_EQ(twice, 0);
 }
 
 TEST(Nodes, OfAPlaceAreTheSameWhateverElseIsDivided) {
