@@ -2,6 +2,7 @@
 #include <xmmintrin.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -49,6 +50,21 @@ PointLinks::LitPatch PointLinks::lit_patch(std::shared_ptr<const Link> link, std
     patch.sent[e] = glm::vec4(radiosity, 0);
   }
   if (sum > 0) patch.centroid /= sum;
+  if (!link->partial.empty()) {
+    float of_group[kGroups] = {};
+    for (std::size_t k = first; k < last; ++k) {
+      const int e = bright[k].element % per_slot;
+      const glm::vec3 radiosity = bright[k].radiosity;
+      of_group[group_of(e)] += link->element[e].w * (radiosity.x + radiosity.y + radiosity.z) / sum;
+    }
+    patch.share_of_groups.assign(2 << kGroups / 2, 0.f);
+    for (int half = 0; half < 2; ++half)
+      for (int groups = 1; groups < 1 << kGroups / 2; ++groups) {
+        float* share = &patch.share_of_groups[static_cast<std::size_t>(half) << kGroups / 2];
+        const int last_group = std::countr_zero(static_cast<unsigned>(groups));
+        share[groups] = share[groups & (groups - 1)] + of_group[half * kGroups / 2 + last_group];
+      }
+  }
   for (std::size_t e = 0; e < link->element.size() && patch.is_even; ++e)
     for (int channel = 0; channel < 3; ++channel)
       patch.is_even &= link->element[e].w <= 0 ||
@@ -94,6 +110,22 @@ void PointLinks::add_blocks(const std::vector<LitPatch>& lit, std::size_t chunk,
         if constexpr (!kIsGrey) {
           green[to + k] += weight * flux.y;
           blue[to + k] += weight * flux.z;
+        }
+      }
+    }
+    if (!patch.is_even) {
+      const auto is_before = [](const Partial& partial, std::size_t point) {
+        return static_cast<std::size_t>(partial.point) < point;
+      };
+      auto partial = std::lower_bound(link.partial.begin(), link.partial.end(), base, is_before);
+      for (; partial != link.partial.end() && static_cast<std::size_t>(partial->point) < last_block * kBlock;
+           ++partial) {
+        const auto point = static_cast<std::size_t>(partial->point);
+        const float weight = seen_share(partial->seen) * patch.share_of(partial->groups) * point_weight(c, m, point);
+        red[point - base] += weight * flux.x;
+        if constexpr (!kIsGrey) {
+          green[point - base] += weight * flux.y;
+          blue[point - base] += weight * flux.z;
         }
       }
     }

@@ -125,6 +125,37 @@ TEST(Nodes, AreOneWherePartsMeet) {
   EXPECT_EQ(twice, 0);
 }
 
+TEST(Nodes, HaveNeighboursOnTheirFaceAndAcrossItsEdges) {
+  const SceneGeometry scene = roof_light_room(0.5f);
+  const Faces faces = make_faces(scene);
+  const RayScene rays(faces, scene.materials, scene.openings);
+  const LightMesh mesh(faces, std::vector<float>(faces.faces.size(), 0.5f), 4);
+  std::vector<int> slots;
+  for (int slot = 0; slot < mesh.slot_count(); slot += 2) slots.push_back(slot);  // inner sides
+  NodeField field(mesh, rays, slots, 0);
+  std::vector<char> is_exposed(field.nodes().size(), 1);
+  is_exposed[0] = 0;
+  field.expose(is_exposed, 0);
+  const NodeNeighbours neighbours = field.neighbours();
+  EXPECT_TRUE(neighbours.of(0).empty());
+  int alone = 0, across = 0;
+  for (std::size_t i = 1; i < field.nodes().size(); ++i) {
+    bool is_itself = false, is_across = false;
+    for (const int other : neighbours.of(i)) {
+      const auto k = static_cast<std::size_t>(other);
+      is_itself |= k == i;
+      is_across |= field.surface(k) != field.surface(i);
+      const auto back = neighbours.of(k);
+      EXPECT_NE(std::find(back.begin(), back.end(), static_cast<int>(i)), back.end());
+      EXPECT_LT(glm::length(field.nodes()[k].position - field.nodes()[i].position), 1.5f);
+    }
+    alone += !is_itself || neighbours.of(i).size() < 3;
+    across += is_across;
+  }
+  EXPECT_EQ(alone, 0);
+  EXPECT_GT(across, 50);
+}
+
 TEST(Nodes, OfAPlaceAreTheSameWhateverElseIsDivided) {
   Engine coarse(roof_light_room(0.5f), tregenza(), options(0.1f)),
       fine(roof_light_room(0.5f), tregenza(), options(0.02f));
