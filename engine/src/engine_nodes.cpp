@@ -310,7 +310,7 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
 }
 
 void Engine::link_nodes(const Known& known) {
-  links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes());
+  links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes(), nodes_->neighbours());
   PointLinks::Known known_links;
   if (known.engine && known.engine->links_)
     known_links = {known.engine->links_.get(), known.change.get(), known.node, known.has_same_nodes,

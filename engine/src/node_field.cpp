@@ -16,7 +16,8 @@ constexpr float kBorder = 1e-4f;  // of a part: nearer than that is at the borde
 constexpr float kLeastWeight = 1e-3f;
 constexpr float kLongAspect = 1.6f;      // from which a part is divided along its longer axis alone
 constexpr float kFlatCosine = 0.99999f;  // between shading normals of corners: across a curve light does change
-constexpr float kPlaceScale = 1 << 24;   // steps of the parameters of a face that tell places of nodes apart
+constexpr float kPlaceScale = 1 << 20;   // steps of the parameters of a face that tell places of nodes apart
+constexpr float kSamePlace = 0.1f;       // of a step: what rounding makes of one place at most
 
 float determinant(glm::vec2 a, glm::vec2 b) {
   return a.x * b.y - a.y * b.x;
@@ -68,8 +69,15 @@ void NodeField::add_part(int surface, glm::vec2 corner, glm::vec2 u, glm::vec2 v
 }
 
 int NodeField::node_at(int surface, glm::vec2 st) {
-  const auto step = [](float x) { return static_cast<std::uint64_t>(std::lround(x * kPlaceScale)); };
-  const std::uint64_t place = step(st.x) << 32 | step(st.y);
+  const auto step = [](float steps) { return static_cast<std::uint64_t>(std::lround(steps)); };
+  const glm::vec2 steps = st * kPlaceScale;
+  // Two parts may say the same place differently by a little, on both sides of where steps part.
+  for (const float dx : {-kSamePlace, kSamePlace})
+    for (const float dy : {-kSamePlace, kSamePlace}) {
+      const auto known = node_of_place_[surface].find(step(steps.x + dx) << 32 | step(steps.y + dy));
+      if (known != node_of_place_[surface].end()) return known->second;
+    }
+  const std::uint64_t place = step(steps.x) << 32 | step(steps.y);
   const auto [entry, is_new] = node_of_place_[surface].try_emplace(place, static_cast<int>(nodes_.size()));
   if (is_new) {
     const int face = surface / 2, side = surface % 2;

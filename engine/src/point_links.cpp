@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <numeric>
 
 #include "transom/parallel.h"
@@ -11,7 +9,6 @@
 namespace transom {
 namespace {
 
-constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kFar = 4;  // diameters from which a patch counts as a point: then it errs by about 1 % of its share
 constexpr std::size_t kMemory = 512u << 20;  // for links [bytes]
 
@@ -20,34 +17,15 @@ constexpr std::size_t kMemory = 512u << 20;  // for links [bytes]
 // not.
 constexpr glm::vec3 kAside{0.11f, 0.15f, 0.23f};
 
-// Shares of light that arrive at the end of segments: 0 behind something opaque, else the transmittance on the way.
-// is_glazed: whether there are openings on the way.
-void seen_shares(const RayScene& rays, std::vector<Ray> segments, float lift, std::vector<float>& shares,
-                 std::vector<std::uint8_t>& is_glazed) {
-  for (Ray& segment : segments) segment.origin += lift * kAside;
-  std::vector<std::uint8_t> is_stopped(segments.size());
-  rays.occluded(RayScene::What::kOpaque, segments, is_stopped, RayScene::Order::kCoherent);
-  shares.resize(segments.size());
-  for (std::size_t k = 0; k < segments.size(); ++k) shares[k] = is_stopped[k] ? 0.f : 1.f;
-  is_glazed.assign(segments.size(), 0);
-  if (!rays.has_openings()) return;
-  rays.occluded(RayScene::What::kOpenings, segments, is_glazed, RayScene::Order::kCoherent);
-  std::vector<Ray> through;
-  std::vector<std::size_t> index;
-  for (std::size_t k = 0; k < segments.size(); ++k)
-    if ((is_glazed[k] &= shares[k] > 0)) {
-      through.push_back(segments[k]);
-      index.push_back(k);
-    }
-  std::vector<float> transmitted(through.size());
-  rays.transmittance(through, transmitted);
-  for (std::size_t k = 0; k < through.size(); ++k) shares[index[k]] = transmitted[k];
-}
-
 }  // namespace
 
-PointLinks::PointLinks(const LightMesh& mesh, const RayScene& rays, const std::vector<Node>& points)
-    : mesh_(mesh), rays_(rays), point_count_(points.size()), links_(static_cast<std::size_t>(mesh.slot_count())) {
+PointLinks::PointLinks(const LightMesh& mesh, const RayScene& rays, const std::vector<Node>& points,
+                       NodeNeighbours neighbours)
+    : mesh_(mesh),
+      rays_(rays),
+      point_count_(points.size()),
+      neighbours_(std::move(neighbours)),
+      links_(static_cast<std::size_t>(mesh.slot_count())) {
   const std::size_t padded = (points.size() + kBlock - 1) / kBlock * kBlock;
   for (std::vector<float>* list : {&x_, &y_, &z_, &nx_, &ny_, &nz_}) list->assign(padded, 0.f);
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -70,33 +48,56 @@ PointLinks::PointLinks(const LightMesh& mesh, const RayScene& rays, const std::v
   }
 }
 
-// The middle of the elements of a patch that do not lie inside a solid, moved to the nearest of their own middles.
-glm::vec3 PointLinks::exposed_middle(int slot_index) const {
+// The middle is that of the exposed elements; where it may lie off the patch or inside a solid, the nearest of theirs.
+PointLinks::Exposed PointLinks::exposed_part(int slot_index) const {
   const int element_count = mesh_.elements_per_slot();
   std::vector<Ray> outwards;
+  std::vector<int> element;
   for (int e = 0; e < element_count; ++e) {
-    const int element = slot_index * element_count + e;
-    if (!(mesh_.element_area(element) > 0)) continue;
-    const Node middle = mesh_.middle_of_element(element);
+    if (!(mesh_.element_area(slot_index * element_count + e) > 0)) continue;
+    const Node middle = mesh_.middle_of_element(slot_index * element_count + e);
     outwards.push_back({middle.position, middle.normal});
+    element.push_back(e);
   }
   std::vector<Hit> hits(outwards.size());
   rays_.intersect(RayScene::What::kOpaque, outwards, hits, RayScene::Order::kCoherent);
   glm::vec3 sum(0), all(0);
-  int count = 0;
+  std::size_t count = 0;
   for (std::size_t e = 0; e < outwards.size(); ++e) {
     all += outwards[e].origin;
     if (hits[e].face >= 0 && mesh_.faces().is_inside_solid(hits[e].face, hits[e].side)) continue;
     sum += outwards[e].origin;
-    outwards[static_cast<std::size_t>(count++)] = outwards[e];
+    outwards[count] = outwards[e];
+    element[count++] = element[e];
   }
+  Exposed exposed;
   const bool is_planar = !mesh_.is_cluster(slot_index);
-  if (count == 0 || (is_planar && count == element_count)) return all / static_cast<float>(outwards.size());
-  sum /= static_cast<float>(count);
-  return std::min_element(
-             outwards.begin(), outwards.begin() + count,
-             [&](const Ray& a, const Ray& b) { return glm::length(a.origin - sum) < glm::length(b.origin - sum); })
-      ->origin;
+  if (count == 0 || (is_planar && count == static_cast<std::size_t>(element_count))) {
+    exposed.middle = all / static_cast<float>(outwards.size());
+  } else {
+    sum /= static_cast<float>(count);
+    const auto offset = [&](const Ray& ray) { return glm::length(ray.origin - sum); };
+    exposed.middle = std::min_element(outwards.begin(), outwards.begin() + static_cast<std::ptrdiff_t>(count),
+                                      [&](const Ray& a, const Ray& b) { return offset(a) < offset(b); })
+                         ->origin;
+  }
+  // Those farthest from what has been taken come first: an edge between any two of them lies between the first.
+  std::vector<std::size_t> left;  // one of each group
+  std::vector<float> distance;
+  for (std::size_t e = 0; e < count; ++e) {
+    if (!left.empty() && group_of(element[left.back()]) == group_of(element[e])) continue;
+    left.push_back(e);
+    distance.push_back(glm::length(outwards[e].origin - exposed.middle));
+    exposed.radius = std::max(exposed.radius, distance.back());
+  }
+  for (std::size_t taken = 0; taken < left.size(); ++taken) {
+    const auto next = static_cast<std::size_t>(std::max_element(distance.begin(), distance.end()) - distance.begin());
+    exposed.elements.push_back(element[left[next]]);
+    for (std::size_t k = 0; k < left.size(); ++k)
+      distance[k] = std::min(distance[k], glm::length(outwards[left[k]].origin - outwards[left[next]].origin));
+    distance[next] = -1;
+  }
+  return exposed;
 }
 
 const float* PointLinks::Link::near_weight_of(int point, std::size_t element_count) const {
@@ -112,34 +113,76 @@ PointLinks::KnownPoints::KnownPoints(const Known& all_known, const Link* known_l
   for (std::size_t k = 0; k < link->block.size(); ++k)
     std::copy_n(link->seen.begin() + static_cast<std::ptrdiff_t>(k * kBlock), kBlock,
                 seen.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(link->block[k]) * kBlock));
+  is_asked.assign(seen.size(), 0);
+  for (std::size_t k = 0; k < link->block.size(); ++k)
+    for (std::size_t bit = 0; bit < kBlock; ++bit)
+      is_asked[static_cast<std::size_t>(link->block[k]) * kBlock + bit] = link->asked[k] >> bit & 1;
+  for (const Partial& partial : link->partial) seen[static_cast<std::size_t>(partial.point)] = partial.seen_of_middle;
   is_glazed.assign(seen.size(), 0);
   for (const int point : link->glazed_point) is_glazed[static_cast<std::size_t>(point)] = 1;
 }
 
 int PointLinks::KnownPoints::number(int point) const {
   const int known_point = link ? known.point[static_cast<std::size_t>(point)] : -1;
-  return known_point < 0 || known.has_same_glazing || !is_glazed[static_cast<std::size_t>(known_point)] ? known_point
-                                                                                                        : -1;
+  if (known_point < 0 || !known.links->gets_light(known_point)) return -1;
+  return known.has_same_glazing || !is_glazed[static_cast<std::size_t>(known_point)] ? known_point : -1;
+}
+
+const PointLinks::Partial* PointLinks::KnownPoints::partial(int known_point) const {
+  const auto found = std::lower_bound(link->partial.begin(), link->partial.end(), known_point,
+                                      [](const Partial& partial, int point) { return partial.point < point; });
+  return found != link->partial.end() && found->point == known_point ? &*found : nullptr;
 }
 
 // The link of a patch in the other state, if the same part of the patch was exposed there.
-std::shared_ptr<const PointLinks::Link> PointLinks::known_link(int slot, glm::vec3 middle, const Known& known) const {
+std::shared_ptr<const PointLinks::Link> PointLinks::known_link(int slot, const Exposed& exposed,
+                                                               const Known& known) const {
   const int slot_before = known.links ? known.change->slot_before(slot) : -1;
-  if (slot_before < 0 || (!known.change->is_none() && known.links->exposed_middle(slot_before) != middle))
+  if (slot_before < 0 || (!known.change->is_none() && !(known.links->exposed_part(slot_before) == exposed)))
     return nullptr;
   const std::lock_guard lock(known.links->mutex_);
   return known.links->links_[static_cast<std::size_t>(slot_before)];
 }
 
-std::shared_ptr<const PointLinks::Link> PointLinks::link(int slot_index, const Known& known) const {
-  const glm::vec3 middle = exposed_middle(slot_index);
-  const std::shared_ptr<const Link> before = known_link(slot_index, middle, known);
-  if (before && known.has_same_points && (known.has_same_glazing || before->glazed_point.empty())) return before;
-  const glm::vec3 normal = mesh_.normal_of(slot_index);
-  const float size2 = 2 * mesh_.slot_area(slot_index), size = std::sqrt(size2);
-  auto link = std::make_shared<Link>();
-  for (int e = slot_index * mesh_.elements_per_slot(); e < (slot_index + 1) * mesh_.elements_per_slot(); ++e)
-    link->element.emplace_back(mesh_.middle_of_element(e).position, mesh_.element_area(e));
+// Shares of light that arrive at the end of segments: 0 behind something opaque, else the transmittance on the way.
+// is_glazed: whether there are openings on the way.
+void PointLinks::seen_shares(std::vector<Ray> segments, RayScene::Order order, std::vector<float>& shares,
+                             std::vector<std::uint8_t>& is_glazed) const {
+  for (Ray& segment : segments) segment.origin += mesh_.faces().ray_offset() * kAside;
+  std::vector<std::uint8_t> is_stopped(segments.size());
+  rays_.occluded(RayScene::What::kOpaque, segments, is_stopped, order);
+  shares.resize(segments.size());
+  for (std::size_t k = 0; k < segments.size(); ++k) shares[k] = is_stopped[k] ? 0.f : 1.f;
+  is_glazed.assign(segments.size(), 0);
+  if (!rays_.has_openings()) return;
+  std::vector<Ray> open;
+  std::vector<std::size_t> index;
+  for (std::size_t k = 0; k < segments.size(); ++k)
+    if (!is_stopped[k]) {
+      open.push_back(segments[k]);
+      index.push_back(k);
+    }
+  std::vector<std::uint8_t> meets_opening(open.size());
+  rays_.occluded(RayScene::What::kOpenings, open, meets_opening, order);
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < open.size(); ++k)
+    if (meets_opening[k]) {
+      is_glazed[index[k]] = 1;
+      open[kept] = open[k];
+      index[kept++] = index[k];
+    }
+  open.resize(kept);
+  std::vector<float> transmitted(kept);
+  rays_.transmittance(open, transmitted);
+  for (std::size_t k = 0; k < kept; ++k) shares[index[k]] = transmitted[k];
+}
+
+// Which points are in front of a patch, and how the far ones see its middle.
+PointLinks::MiddleView PointLinks::middle_view(int slot, Exposed exposed, const Known& known) const {
+  MiddleView view{slot, std::move(exposed), nullptr, std::vector<std::uint8_t>(x_.size(), kNotFar), {}, {}};
+  view.before = known_link(slot, view.exposed, known);
+  const glm::vec3 middle = view.exposed.middle, normal = mesh_.normal_of(slot);
+  const float size2 = 2 * mesh_.slot_area(slot), size = std::sqrt(size2);
   std::vector<int> far_points;
   std::vector<float> height(kBlock), distance2(kBlock), cosine(kBlock);
   for (std::size_t begin = 0; begin < x_.size(); begin += kBlock) {
@@ -152,83 +195,31 @@ std::shared_ptr<const PointLinks::Link> PointLinks::link(int slot_index, const K
       any |= height[k] > 0 && cosine[k] > -size;
     }
     if (!any) continue;
-    for (std::size_t k = 0; k < kBlock && begin + k < point_count_; ++k)
-      if (height[k] > 0 && cosine[k] > -size)
-        (distance2[k] > kFar * kFar * size2 ? far_points : link->near_point).push_back(static_cast<int>(begin + k));
+    for (std::size_t k = 0; k < kBlock && begin + k < point_count_; ++k) {
+      const int point = static_cast<int>(begin + k);
+      if (height[k] > 0 && cosine[k] > -size && gets_light(point))
+        (distance2[k] > kFar * kFar * size2 ? far_points : view.near_point).push_back(point);
+    }
   }
-  const KnownPoints known_points(known, before.get());
-  link_far(*link, middle, far_points, known_points);
-  weigh_far(*link, slot_index);
-  link_near(*link, slot_index, known_points);
+  see_middle(view, far_points, KnownPoints(known, view.before.get()));
+  return view;
+}
+
+// beside: the middles of the patches beside this one.
+std::shared_ptr<const PointLinks::Link> PointLinks::link(const MiddleView& view,
+                                                         const std::vector<const MiddleView*>& beside,
+                                                         const Known& known) const {
+  auto link = std::make_shared<Link>();
+  for (int e = view.slot * mesh_.elements_per_slot(); e < (view.slot + 1) * mesh_.elements_per_slot(); ++e)
+    link->element.emplace_back(mesh_.middle_of_element(e).position, mesh_.element_area(e));
+  link->near_point = view.near_point;
+  link->glazed_point = view.glazed_point;
+  const KnownPoints known_points(known, view.before.get());
+  link_far(*link, view, beside, known_points);
+  link_near(*link, view.slot, known_points);
   std::sort(link->glazed_point.begin(), link->glazed_point.end());
   link->glazed_point.erase(std::unique(link->glazed_point.begin(), link->glazed_point.end()), link->glazed_point.end());
   return link;
-}
-
-void PointLinks::link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points,
-                          const KnownPoints& known) const {
-  std::vector<Ray> segments;
-  std::vector<std::uint8_t> seen(far_points.size());
-  std::vector<std::size_t> unknown;
-  std::size_t entered = block_middle_.size();
-  bool is_block_met = false;  // whether what has changed may stand between the patch and some point of the block
-  for (std::size_t k = 0; k < far_points.size(); ++k) {
-    const int i = far_points[k], known_point = known.number(i);
-    const Ray segment{middle, glm::vec3(x_[i], y_[i], z_[i]) - middle, 0, 1};
-    if (known_point >= 0) {
-      if (entered != static_cast<std::size_t>(i) / kBlock) {
-        entered = static_cast<std::size_t>(i) / kBlock;
-        is_block_met = known.known.change->may_meet(middle, block_middle_[entered], block_radius_[entered]);
-      }
-      if (!is_block_met || !known.known.change->may_meet(segment)) {
-        seen[k] = known.seen[static_cast<std::size_t>(known_point)];
-        if (known.is_glazed[static_cast<std::size_t>(known_point)]) link.glazed_point.push_back(i);
-        continue;
-      }
-    }
-    unknown.push_back(k);
-    segments.push_back(segment);
-  }
-  std::vector<float> shares;
-  std::vector<std::uint8_t> is_glazed;
-  seen_shares(rays_, std::move(segments), mesh_.faces().ray_offset(), shares, is_glazed);
-  for (std::size_t k = 0; k < unknown.size(); ++k) {
-    if (is_glazed[k]) link.glazed_point.push_back(far_points[unknown[k]]);
-    if (shares[k] > 0) seen[unknown[k]] = static_cast<std::uint8_t>(std::lround(255 * std::sqrt(shares[k])));
-  }
-  for (std::size_t k = 0; k < far_points.size(); ++k) {
-    if (seen[k] == 0) continue;
-    const int block = far_points[k] / static_cast<int>(kBlock);
-    if (link.block.empty() || link.block.back() != block) {
-      link.block.push_back(block);
-      link.seen.resize(link.seen.size() + kBlock, 0);
-    }
-    link.seen[link.seen.size() - kBlock + far_points[k] % static_cast<int>(kBlock)] = seen[k];
-  }
-}
-
-// Far points take all of an evenly lit patch to be at its centroid.
-void PointLinks::weigh_far(Link& link, int slot) const {
-  glm::vec3 centroid(0);
-  float area = 0;
-  for (const glm::vec4& element : link.element) {
-    centroid += element.w * glm::vec3(element);
-    area += element.w;
-  }
-  if (!(area > 0)) return;
-  centroid /= area;
-  const glm::vec3 normal = mesh_.normal_of(slot);
-  std::vector<float> weight(link.seen.size());
-  for (std::size_t k = 0; k < weight.size(); ++k)
-    if (link.seen[k] > 0)
-      weight[k] =
-          area / kPi * seen_share(link.seen[k]) *
-          point_weight(centroid, normal, static_cast<std::size_t>(link.block[k / kBlock]) * kBlock + k % kBlock);
-  const float most = weight.empty() ? 0.f : *std::max_element(weight.begin(), weight.end());
-  if (!(most > 0)) return;
-  link.weight_unit = most / std::numeric_limits<std::uint16_t>::max();
-  for (const float value : weight)
-    link.weight.push_back(static_cast<std::uint16_t>(std::lround(value / link.weight_unit)));
 }
 
 void PointLinks::link_near(Link& link, int slot, const KnownPoints& known) const {
@@ -269,7 +260,7 @@ void PointLinks::link_near(Link& link, int slot, const KnownPoints& known) const
     }
   }
   std::vector<std::uint8_t> is_glazed;
-  seen_shares(rays_, std::move(segments), mesh_.faces().ray_offset(), shares, is_glazed);
+  seen_shares(std::move(segments), RayScene::Order::kCoherent, shares, is_glazed);
   for (std::size_t k = 0; k < unknown.size(); ++k) {
     weights[unknown[k]] *= shares[k];
     if (is_glazed[k]) link.glazed_point.push_back(kept[unknown[k] / element_count]);
@@ -284,15 +275,19 @@ void PointLinks::link_near(Link& link, int slot, const KnownPoints& known) const
 
 std::size_t PointLinks::bytes_of(const Link& link) const {
   return sizeof(int) * (link.block.size() + link.near_point.size() + link.glazed_point.size()) + link.seen.size() +
+         sizeof(std::uint64_t) * link.asked.size() + sizeof(Partial) * link.partial.size() +
          sizeof(std::uint16_t) * link.weight.size() + sizeof(float) * (link.near_weight.size() + link.near_sum.size()) +
          sizeof(glm::vec4) * link.element.size();
 }
 
+// In the order of slots, so that patches that are beside each other come together.
 void PointLinks::prepare(const std::vector<int>& slots, const Known& known) const {
-  constexpr std::size_t kBatch = 256;  // of patches, after which the memory is looked at
-  for (std::size_t begin = 0; begin < slots.size() && byte_count() < kMemory; begin += kBatch)
-    links_of({slots.begin() + static_cast<std::ptrdiff_t>(begin),
-              slots.begin() + static_cast<std::ptrdiff_t>(std::min(slots.size(), begin + kBatch))},
+  constexpr std::size_t kBatch = 512;  // of patches, after which the memory is looked at
+  std::vector<int> in_order = slots;
+  std::sort(in_order.begin(), in_order.end());
+  for (std::size_t begin = 0; begin < in_order.size() && byte_count() < kMemory; begin += kBatch)
+    links_of({in_order.begin() + static_cast<std::ptrdiff_t>(begin),
+              in_order.begin() + static_cast<std::ptrdiff_t>(std::min(in_order.size(), begin + kBatch))},
              known);
 }
 
@@ -306,27 +301,85 @@ std::vector<std::shared_ptr<const PointLinks::Link>> PointLinks::links_of(const 
                                                                           const Known& known) const {
   std::vector<std::shared_ptr<const Link>> found(slots.size());
   std::vector<std::size_t> missing;
+  std::vector<int> missing_slots;
   {
     const std::lock_guard lock(mutex_);
     for (std::size_t k = 0; k < slots.size(); ++k) {
       found[k] = links_[slots[k]];
-      if (!found[k]) missing.push_back(k);
+      if (found[k]) continue;
+      missing.push_back(k);
+      missing_slots.push_back(slots[k]);
     }
   }
   if (missing.empty()) return found;
-  parallel_indices(missing.size(), 1, [&](std::size_t k) { found[missing[k]] = link(slots[missing[k]], known); });
+  const std::vector<std::shared_ptr<const Link>> made = found_links(missing_slots, known);
   const std::lock_guard lock(mutex_);
-  for (const std::size_t k : missing) {
-    const Link& made = *found[k];
-    if (links_[slots[k]]) continue;
+  for (std::size_t k = 0; k < missing.size(); ++k) {
+    found[missing[k]] = made[k];
+    if (links_[missing_slots[k]]) continue;
     if (byte_count_ >= kMemory) {
       std::fill(links_.begin(), links_.end(), nullptr);
       byte_count_ = 0;
     }
-    byte_count_ += bytes_of(made);
-    links_[slots[k]] = found[k];
+    byte_count_ += bytes_of(*made[k]);
+    links_[missing_slots[k]] = made[k];
   }
   return found;
+}
+
+// Middles first, also of the patches beside these: how they are seen says where elements need to be asked for.
+std::vector<std::shared_ptr<const PointLinks::Link>> PointLinks::found_links(const std::vector<int>& slots,
+                                                                             const Known& known) const {
+  std::vector<std::shared_ptr<const Link>> links(slots.size());
+  std::vector<Exposed> exposed(slots.size());
+  parallel_indices(slots.size(), 1, [&](std::size_t k) {
+    exposed[k] = exposed_part(slots[k]);
+    const std::shared_ptr<const Link> before = known_link(slots[k], exposed[k], known);
+    if (before && known.has_same_points && (known.has_same_glazing || before->glazed_point.empty())) links[k] = before;
+  });
+  std::vector<int> seen_slots;
+  for (std::size_t k = 0; k < slots.size(); ++k) {
+    if (links[k]) continue;
+    seen_slots.push_back(slots[k]);
+    if (neighbours_.begin.empty()) continue;
+    const std::vector<int> beside = slots_beside(slots[k]);
+    seen_slots.insert(seen_slots.end(), beside.begin(), beside.end());
+  }
+  std::sort(seen_slots.begin(), seen_slots.end());
+  seen_slots.erase(std::unique(seen_slots.begin(), seen_slots.end()), seen_slots.end());
+  std::vector<MiddleView> views(seen_slots.size());
+  parallel_indices(views.size(), 1,
+                   [&](std::size_t k) { views[k] = middle_view(seen_slots[k], exposed_part(seen_slots[k]), known); });
+  const auto view_of = [&](int slot) {
+    return &views[static_cast<std::size_t>(std::lower_bound(seen_slots.begin(), seen_slots.end(), slot) -
+                                           seen_slots.begin())];
+  };
+  parallel_indices(slots.size(), 1, [&](std::size_t k) {
+    if (links[k]) return;
+    std::vector<const MiddleView*> beside;
+    if (!neighbours_.begin.empty())
+      for (const int slot : slots_beside(slots[k])) beside.push_back(view_of(slot));
+    links[k] = link(*view_of(slots[k]), beside, known);
+  });
+  return links;
+}
+
+// Patches of the same side of a face that have an edge in common with this one.
+std::vector<int> PointLinks::slots_beside(int index) const {
+  if (mesh_.is_cluster(index)) return {};
+  const Slot slot = mesh_.slot(index);
+  const Grid& grid = mesh_.grid(slot.face);
+  // Where the middles of cells beside lie in the coordinates of this one.
+  constexpr float kThird = 1.f / 3;
+  const glm::vec2 of_quad[]{{1.5f, 0.5f}, {-0.5f, 0.5f}, {0.5f, 1.5f}, {0.5f, -0.5f}},
+      of_triangle[]{{2 * kThird, 2 * kThird}, {-kThird, 2 * kThird}, {2 * kThird, -kThird}};
+  std::vector<int> beside;
+  for (const glm::vec2 middle : grid.is_quad ? std::span<const glm::vec2>(of_quad) : std::span(of_triangle)) {
+    const glm::vec2 st = grid.parameters({slot.cell, middle});
+    if (st.x < 0 || st.y < 0 || st.x > 1 || st.y > 1 || (!grid.is_quad && st.x + st.y > 1)) continue;
+    beside.push_back(mesh_.slot_index(slot.face, slot.side, grid.locate(st).cell));
+  }
+  return beside;
 }
 
 }  // namespace transom

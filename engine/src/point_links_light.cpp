@@ -1,5 +1,6 @@
 // The first reflection of beams towards linked points.
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -63,12 +64,33 @@ PointLinks::LitPatch PointLinks::lit_patch(std::shared_ptr<const Link> link, std
     patch.is_even &= is_alike(e, bright[first].radiosity, kEven);
     is_of_one_hue &= is_alike(e, strongest_channel(sent[e]) * patch.hue, kSameHue);
   }
+  if (!link->partial.empty()) patch.share_of_groups = shares_of_groups(*link, bright.subspan(first, last - first), sum);
   patch.radiosity = strongest_channel(bright[first].radiosity);
   for (int channel = 0; channel < (is_of_one_hue ? 1 : 3); ++channel)
     for (const glm::vec3& element : sent)
       patch.sent.push_back(is_of_one_hue ? strongest_channel(element) : element[channel]);
   patch.link = std::move(link);
   return patch;
+}
+
+// Shares of the light of a patch: sum of element areas x radiosity. Of all sets of the first half of the groups, then
+// of the second half.
+std::vector<float> PointLinks::shares_of_groups(const Link& link, std::span<const BrightElement> bright,
+                                                float sum) const {
+  constexpr int kHalf = kGroups / 2;
+  float of_group[kGroups] = {};
+  for (const BrightElement& b : bright) {
+    const int e = b.element % mesh_.elements_per_slot();
+    if (sum > 0) of_group[group_of(e)] += link.element[e].w * (b.radiosity.x + b.radiosity.y + b.radiosity.z) / sum;
+  }
+  std::vector<float> shares(2 << kHalf, 0.f);
+  for (int half = 0; half < 2; ++half)
+    for (int groups = 1; groups < 1 << kHalf; ++groups) {
+      float* share = &shares[static_cast<std::size_t>(half) << kHalf];
+      const int first_group = std::countr_zero(static_cast<unsigned>(groups));
+      share[groups] = share[groups & (groups - 1)] + of_group[half * kHalf + first_group];
+    }
+  return shares;
 }
 
 // Lit patches by hue: within one, a single channel is summed.
@@ -93,7 +115,6 @@ void PointLinks::add_far(const Hue& hue, std::size_t first_block, std::size_t la
   for (const LitPatch* patch : hue.patches) {
     const Link& link = *patch->link;
     if (patch->is_even && link.weight.empty()) continue;
-    const glm::vec3 c = patch->centroid, m = patch->normal;
     const float scale = link.weight_unit * patch->radiosity;
     auto block = std::lower_bound(link.block.begin(), link.block.end(), static_cast<int>(first_block));
     for (; block != link.block.end() && *block < static_cast<int>(last_block); ++block) {
@@ -104,12 +125,29 @@ void PointLinks::add_far(const Hue& hue, std::size_t first_block, std::size_t la
         const std::uint16_t* known = &link.weight[place];
         for (std::size_t k = 0; k < kBlock; ++k) to[k] += scale * static_cast<float>(static_cast<int>(known[k]));
       } else {
-        const std::uint8_t* seen = &link.seen[place];
-        for (std::size_t k = 0; k < kBlock; ++k)
-          to[k] += patch->flux * seen_share(seen[k]) * point_weight(c, m, from + k);
+        add_uneven_block(*patch, place, from, to);
       }
     }
   }
+}
+
+// What an unevenly lit patch sends to the far points of a block; place: of the block in the link.
+void PointLinks::add_uneven_block(const LitPatch& patch, std::size_t place, std::size_t from, float* received) const {
+  const Link& link = *patch.link;
+  const glm::vec3 c = patch.centroid, m = patch.normal;
+  const float flux = patch.flux;
+  const std::uint8_t* seen = &link.seen[place];
+  float share[kBlock];
+  for (std::size_t k = 0; k < kBlock; ++k) share[k] = flux * seen_share(seen[k]);
+  if (!link.partial.empty()) {
+    const auto is_before = [](const Partial& partial, std::size_t point) {
+      return static_cast<std::size_t>(partial.point) < point;
+    };
+    auto partial = std::lower_bound(link.partial.begin(), link.partial.end(), from, is_before);
+    for (; partial != link.partial.end() && static_cast<std::size_t>(partial->point) < from + kBlock; ++partial)
+      share[static_cast<std::size_t>(partial->point) - from] *= patch.share_of(partial->groups);
+  }
+  for (std::size_t k = 0; k < kBlock; ++k) received[k] += share[k] * point_weight(c, m, from + k);
 }
 
 // What lit patches send to the points of a few blocks.

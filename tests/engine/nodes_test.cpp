@@ -1,6 +1,7 @@
 // Where light is gathered to be shown, and what is shown between.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -104,6 +105,55 @@ TEST(Nodes, AreAddedAroundASlabAndNotInTheRestOfTheRoom) {
       if (place.z < 0.4f) (is_near(place) ? added_near : added_far) += sign;
     }
   EXPECT_GT(added_near, 4 * std::abs(added_far));
+}
+
+TEST(Nodes, AreOneWherePartsMeet) {
+  // Walls of a length that no number of cells divides without rounding.
+  SceneGeometry scene = roof_light_room(0.5f);
+  for (glm::dvec3& vertex : scene.vertices) vertex *= glm::dvec3(1.07, 1.13, 0.97);
+  const Engine engine(scene, tregenza(), options(0.06f));
+  const std::span<const Node> nodes = engine.nodes();
+  std::vector<glm::vec3> places;
+  for (const Node& node : nodes) places.push_back(node.position);
+  std::sort(places.begin(), places.end(), [](glm::vec3 a, glm::vec3 b) {
+    return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
+  });
+  int twice = 0;
+  for (std::size_t i = 0; i < places.size(); ++i)
+    for (std::size_t k = i + 1; k < places.size() && places[k].x - places[i].x < 1e-5f; ++k)
+      twice += glm::length(places[k] - places[i]) < 1e-5f;
+  EXPECT_EQ(twice, 0);
+}
+
+TEST(Nodes, HaveNeighboursOnTheirFaceAndAcrossItsEdges) {
+  const SceneGeometry scene = roof_light_room(0.5f);
+  const Faces faces = make_faces(scene);
+  const RayScene rays(faces, scene.materials, scene.openings);
+  const LightMesh mesh(faces, std::vector<float>(faces.faces.size(), 0.5f), 4);
+  std::vector<int> slots;
+  for (int slot = 0; slot < mesh.slot_count(); slot += 2) slots.push_back(slot);  // inner sides
+  NodeField field(mesh, rays, slots, 0);
+  std::vector<char> is_exposed(field.nodes().size(), 1);
+  is_exposed[0] = 0;
+  field.expose(is_exposed, 0);
+  const NodeNeighbours neighbours = field.neighbours();
+  EXPECT_TRUE(neighbours.of(0).empty());
+  int alone = 0, across = 0;
+  for (std::size_t i = 1; i < field.nodes().size(); ++i) {
+    bool is_itself = false, is_across = false;
+    for (const int other : neighbours.of(i)) {
+      const auto k = static_cast<std::size_t>(other);
+      is_itself |= k == i;
+      is_across |= field.surface(k) != field.surface(i);
+      const auto back = neighbours.of(k);
+      EXPECT_NE(std::find(back.begin(), back.end(), static_cast<int>(i)), back.end());
+      EXPECT_LT(glm::length(field.nodes()[k].position - field.nodes()[i].position), 1.5f);
+    }
+    alone += !is_itself || neighbours.of(i).size() < 3;
+    across += is_across;
+  }
+  EXPECT_EQ(alone, 0);
+  EXPECT_GT(across, 50);
 }
 
 TEST(Nodes, OfAPlaceAreTheSameWhateverElseIsDivided) {

@@ -116,6 +116,63 @@ TEST(PointLinks, ATableHidesTheFloorBelowIt) {
   EXPECT_LT(covered.by_links(hidden)[0].y, 1e-3f);
 }
 
+// Points in a row high above the floor and a screen between, so that some see a part of the patches below its edge.
+struct ScreenedFloor : LitFloor {
+  NodeNeighbours neighbours;
+
+  explicit ScreenedFloor(bool knows_neighbours) : LitFloor(true) {
+    points.clear();
+    neighbours.begin = {0};
+    for (int i = 0; i < 60; ++i) {
+      points.push_back({glm::vec3(-2 + 0.13 * i, 2.03, 4) - glm::vec3(faces.origin), {0, 0, -1}});
+      for (const int other : {i - 1, i, i + 1})
+        if (other >= 0 && other < 60) neighbours.node.push_back(other);
+      neighbours.begin.push_back(neighbours.node.size());
+    }
+    if (!knows_neighbours) neighbours = {};
+  }
+
+  // Of what connections with many rays find, by the mean over the points.
+  double mean_error() const {
+    PointLinks links(*mesh, *rays, points, neighbours);
+    const FirstBounce connections(*mesh, *rays, bright);
+    const std::vector<glm::vec3> linked = by_links(links);
+    double error = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const float expected = connections.irradiance(points[i].position, points[i].normal, FirstBounce::Rays::kMany).y;
+      error += std::abs(linked[i].y - expected) / expected / static_cast<double>(points.size());
+    }
+    return error;
+  }
+};
+
+TEST(PointLinks, APatchThatIsPartlyHiddenIsPartlySeen) {
+  // Lit evenly, lit in every third element alone, and in other colours: the part that is seen counts, not the share.
+  for (const std::size_t step : {1, 3}) {
+    ScreenedFloor all_or_nothing(false), parts(true);
+    for (ScreenedFloor* floor : {&all_or_nothing, &parts}) {
+      std::vector<BrightElement> kept;
+      for (std::size_t k = 0; k < floor->bright.size(); k += step) kept.push_back(floor->bright[k]);
+      floor->bright = kept;
+      floor->bright.resize(40 / step * 16);  // the first rows of patches, of which the screen hides some
+    }
+    EXPECT_GT(all_or_nothing.mean_error(), 0.02) << step;
+    EXPECT_LT(parts.mean_error(), 0.3 * all_or_nothing.mean_error()) << step;
+  }
+}
+
+TEST(PointLinks, APointWithoutNeighboursGetsNoLight) {
+  LitFloor floor;
+  NodeNeighbours neighbours;
+  neighbours.begin.assign(floor.points.size() + 1, 1);
+  neighbours.begin[0] = 0;
+  neighbours.node = {0};  // the first alone is shown
+  PointLinks links(*floor.mesh, *floor.rays, floor.points, neighbours), all(*floor.mesh, *floor.rays, floor.points);
+  const std::vector<glm::vec3> some = floor.by_links(links), every = floor.by_links(all);
+  EXPECT_NEAR(some[0].x, every[0].x, 1e-4f * every[0].x);  // stored to 16 bits of the largest
+  for (std::size_t i = 1; i < some.size(); ++i) EXPECT_EQ(some[i], glm::vec3(0)) << i;
+}
+
 TEST(PointLinks, GlassTakesItsShare) {
   // What a link keeps of a transmittance is rounded to 1/255 of its root.
   LitFloor clear(false, 1.f), dark(false, 0.3f);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -19,6 +20,17 @@ struct NodeShares {
   std::array<float, 4> weight{};
   int count = 0;
 };
+
+/// For each node those around it and itself; none for a node that is not exposed.
+struct NodeNeighbours {
+  std::vector<std::size_t> begin;  ///< in `node`; one more than nodes, or none
+  std::vector<int> node;
+  std::span<const int> of(std::size_t i) const {
+    return begin.empty() ? std::span<const int>() : std::span(node.data() + begin[i], begin[i + 1] - begin[i]);
+  }
+};
+
+class NodeBuckets;
 
 /// Nodes at the corners of cells, and of the parts into which cells are divided where light changes within them. Parts
 /// of one side of a face share the nodes that they have in common. Where something stands between the nodes of a part,
@@ -49,6 +61,9 @@ class NodeField {
   /// Corners of a part: 4, or 3 on a triangle.
   int corner_count(int part) const { return is_quad(parts_[part]) ? 4 : 3; }
   const std::array<int, 4>& corners(int part) const { return parts_[part].corner_node; }
+  /// Exposed nodes that share a part which is not divided, and the nearest ones on other surfaces that are no farther
+  /// than such parts are long.
+  NodeNeighbours neighbours() const;
   /// Lengths of a part along its two axes [m].
   glm::vec2 size(int part) const { return size(parts_[part]); }
 
@@ -76,6 +91,8 @@ class NodeField {
     std::uint8_t division = 0;  // of u: bit 0; of v: bit 1
     char is_split = 0;
   };
+  std::vector<int> nearest_on_other_surfaces(int node, const std::vector<float>& reach,
+                                             const NodeBuckets& buckets) const;
   bool is_quad(const Part& part) const { return mesh_.grid(part.surface / 2).is_quad; }
   glm::vec2 size(const Part& part) const;
   void add_part(int surface, glm::vec2 corner, glm::vec2 u, glm::vec2 v);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
@@ -11,6 +12,7 @@
 
 #include "transom/first_bounce.h"
 #include "transom/light_mesh.h"
+#include "transom/node_field.h"
 #include "transom/ray_scene.h"
 #include "transom/scene_change.h"
 
@@ -20,11 +22,16 @@ namespace transom {
 /// patch has been linked: each link holds what stands between a point and a patch.
 ///
 /// A patch at least four diameters away counts as a point at the centroid of its light, seen as much as the middle of
-/// its exposed part is seen; if it is evenly lit, all that is known beforehand. Nearer points see each element for
-/// itself, with its own weight.
+/// its exposed part is seen; if it is evenly lit, all that is known beforehand. Where that middle is seen otherwise
+/// from a point beside, or is seen otherwise than the middle of the patch beside, something may hide a part of the
+/// patch: such a point asks for its elements, and so do those around it as far as they see a part. Nearer points see
+/// each element for itself, with its own weight.
 class PointLinks {
  public:
-  PointLinks(const LightMesh& mesh, const RayScene& rays, const std::vector<Node>& points);
+  /// neighbours: of the points; one that has none, not even itself, gets no light. Left out: all get some, and a far
+  /// patch is seen as its middle is.
+  PointLinks(const LightMesh& mesh, const RayScene& rays, const std::vector<Node>& points,
+             NodeNeighbours neighbours = {});
 
   /// What has been linked in another state of the scene.
   struct Known {
@@ -47,15 +54,25 @@ class PointLinks {
 
  private:
   static constexpr std::size_t kBlock = 64;  // points
+  static constexpr int kGroups = 16;         // of elements
   static constexpr float kLeastDistance2 =
       1e-15f;  // keeps 0 / 0 out of weights that are 0; its square is a normal number
+  /// A far point that sees some of the exposed elements of a patch. Elements are told apart in sixteen groups.
+  struct Partial {
+    int point;
+    std::uint16_t groups;               // those that are seen, bit by bit
+    std::uint8_t seen, seen_of_middle;  // share seen of these, and of the middle of the exposed part
+  };
   /// What one patch is to all points. A seen share T is stored as 255 sqrt(T): 1 is exact, dark glass keeps its digits.
   struct Link {
-    std::vector<int> block;          // blocks of points in front of the patch, ascending
-    std::vector<std::uint8_t> seen;  // kBlock for each of them: of far points; 0 for near ones
+    std::vector<int> block;  // blocks of points in front of the patch, ascending
+    std::vector<std::uint8_t>
+        seen;  // kBlock for each of them: of far points, or of what they see of it; 0 for near ones
+    std::vector<std::uint64_t> asked;  // for each of them a bit a point: whether it has asked for elements
     // For each seen share: irradiance per radiosity where the light of the patch is even, in units of `weight_unit`.
     std::vector<std::uint16_t> weight;
     float weight_unit = 0;
+    std::vector<Partial> partial;    // ascending
     std::vector<int> near_point;     // ascending
     std::vector<float> near_weight;  // for each near point, by element: irradiance per radiosity
     std::vector<float> near_sum;     // for each near point: the sum of these
@@ -67,35 +84,72 @@ class PointLinks {
   struct KnownPoints {
     KnownPoints(const Known& known, const Link* link);
     const Known& known;
-    const Link* link;                           // null: none is known
-    std::vector<std::uint8_t> seen, is_glazed;  // by the numbers of points there
-    int number(int point) const;                // -1: to be found anew
+    const Link* link;                                     // null: none is known
+    std::vector<std::uint8_t> seen, is_glazed, is_asked;  // by the numbers of points there; seen: of the middle
+    int number(int point) const;                          // -1: to be found anew
+    const Partial* partial(int known_point) const;        // null: none
   };
   struct LitPatch {
     std::shared_ptr<const Link> link;
-    glm::vec3 centroid{0}, normal{0};  // of the light
-    glm::vec3 hue{1};                  // of the light: its strongest channel is 1. In that channel:
-    float flux = 0;                    // reflected [lm], over pi
-    bool is_even = true;               // all elements send the same
-    float radiosity = 0;               // of each of them then
-    std::vector<float> sent;           // by element: radiosity; where their hues differ, three channels one by one
+    glm::vec3 centroid{0}, normal{0};    // of the light
+    glm::vec3 hue{1};                    // of the light: its strongest channel is 1. In that channel:
+    float flux = 0;                      // reflected [lm], over pi
+    bool is_even = true;                 // all elements send the same
+    float radiosity = 0;                 // of each of them then
+    std::vector<float> sent;             // by element: radiosity; where their hues differ, three channels one by one
+    std::vector<float> share_of_groups;  // of the light: of any set of the first eight groups, then of the others
+    float share_of(std::uint16_t groups) const {
+      return share_of_groups[groups & 255u] + share_of_groups[256 + (groups >> 8)];
+    }
   };
   struct Hue {
     glm::vec3 colour;  // its strongest channel is 1
     std::vector<const LitPatch*> patches;
   };
   std::size_t bytes_of(const Link& link) const;
-  glm::vec3 exposed_middle(int slot) const;
-  std::shared_ptr<const Link> known_link(int slot, glm::vec3 middle, const Known& known) const;
+  /// The part of a patch that does not lie inside a solid.
+  struct Exposed {
+    glm::vec3 middle{0};
+    float radius = 0;           // around it, of the middles of its elements
+    std::vector<int> elements;  // within the slot: one of each group, those farthest from each other first
+    bool operator==(const Exposed&) const = default;
+  };
+  /// How points see the middle of a patch.
+  struct MiddleView {
+    int slot;
+    Exposed exposed;
+    std::shared_ptr<const Link> before;  // of another state of the scene, if the same part was exposed there
+    std::vector<std::uint8_t> seen;      // by point: the stored share, or kNotFar
+    std::vector<int> near_point, glazed_point;
+  };
+  static constexpr std::uint8_t kNotFar = 1;  // no share is stored so
+  class ElementViews;
+  bool gets_light(int point) const {
+    return neighbours_.begin.empty() || !neighbours_.of(static_cast<std::size_t>(point)).empty();
+  }
+  Exposed exposed_part(int slot) const;
+  int group_of(int element) const { return std::min(element, element * kGroups / mesh_.elements_per_slot()); }
+  std::vector<int> slots_beside(int slot) const;
+  std::shared_ptr<const Link> known_link(int slot, const Exposed& exposed, const Known& known) const;
   std::vector<std::shared_ptr<const Link>> links_of(const std::vector<int>& slots, const Known& known) const;
-  std::shared_ptr<const Link> link(int slot, const Known& known) const;
-  void link_far(Link& link, glm::vec3 middle, const std::vector<int>& far_points, const KnownPoints& known) const;
+  std::vector<std::shared_ptr<const Link>> found_links(const std::vector<int>& slots, const Known& known) const;
+  MiddleView middle_view(int slot, Exposed exposed, const Known& known) const;
+  void see_middle(MiddleView& view, const std::vector<int>& far_points, const KnownPoints& known) const;
+  std::shared_ptr<const Link> link(const MiddleView& view, const std::vector<const MiddleView*>& beside,
+                                   const Known& known) const;
+  void link_far(Link& link, const MiddleView& view, const std::vector<const MiddleView*>& beside,
+                const KnownPoints& known) const;
   void link_near(Link& link, int slot, const KnownPoints& known) const;
+  std::vector<float> shares_of_groups(const Link& link, std::span<const BrightElement> bright, float sum) const;
   static std::vector<Hue> hues_of(const std::vector<LitPatch>& lit);
   void add_far(const Hue& hue, std::size_t first_block, std::size_t last_block, float* received) const;
+  void add_uneven_block(const LitPatch& patch, std::size_t place, std::size_t from, float* received) const;
   void add_blocks(const std::vector<LitPatch>& lit, const std::vector<Hue>& hues, std::size_t chunk,
                   std::vector<glm::vec3>& irradiance) const;
-  // Of what is stored of it.
+  // As it is stored, and back.
+  static std::uint8_t stored_share(float seen) {
+    return seen > 0 ? static_cast<std::uint8_t>(std::max(kNotFar + 1L, std::lround(255 * std::sqrt(seen)))) : 0;
+  }
   static float seen_share(std::uint8_t seen) {
     const float root = static_cast<float>(static_cast<int>(seen)) * (1.f / 255);
     return root * root;
@@ -108,6 +162,8 @@ class PointLinks {
     const float distance2 = std::max(kLeastDistance2, dx * dx + dy * dy + dz * dz);
     return height * cosine / (distance2 * distance2);
   }
+  void seen_shares(std::vector<Ray> segments, RayScene::Order order, std::vector<float>& shares,
+                   std::vector<std::uint8_t>& is_glazed) const;
   void weigh_far(Link& link, int slot) const;
   LitPatch lit_patch(std::shared_ptr<const Link> link, std::span<const BrightElement> bright, std::size_t first,
                      std::size_t last) const;
@@ -115,6 +171,7 @@ class PointLinks {
   const LightMesh& mesh_;
   const RayScene& rays_;
   std::size_t point_count_;
+  NodeNeighbours neighbours_;
   std::vector<float> x_, y_, z_, nx_, ny_, nz_;  // of the points, padded to whole blocks
   std::vector<glm::vec3> block_middle_;
   std::vector<float> block_radius_;
