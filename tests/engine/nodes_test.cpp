@@ -49,8 +49,9 @@ std::vector<double> errors_on_floor(const SceneGeometry& scene, float node_toler
   const Engine engine(scene, tregenza(), options(node_tolerance));
   const auto light = engine.relight(uniform_sky(1000));
   const std::vector<glm::dvec3> points = below_and_beside_the_slab();
-  const std::vector<Irradiance> gathered =
-      test::illuminance(engine, *light, points, std::vector<glm::vec3>(points.size(), {0, 0, 1}), {4096, 2048});
+  Sensors sensors = engine.sensors(points, std::vector<glm::vec3>(points.size(), {0, 0, 1}), {4096, 2048});
+  for (Share& share : sensors.resolved.entries) share.weight = 0;
+  const std::vector<Irradiance> gathered = engine.illuminance(*light, sensors);
   std::vector<glm::vec4> sky, indirect;
   engine.shown_radiance(*light, sky, indirect);
   std::vector<double> errors;
