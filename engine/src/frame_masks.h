@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <span>
 #include <utility>
 
 #include "transom/frame.h"
@@ -36,6 +37,23 @@ class FrameRenderer::Masks {
               row = (pixel / width_ - range_.top) * scale_ + (2 * j + 1) * scale_ / (2 * samples_);
     return static_cast<std::size_t>(row) * static_cast<std::size_t>((range_.right - range_.left) * scale_) +
            static_cast<std::size_t>(column);
+  }
+  /// Whether shares differ in a pixel of the range or in the squares around it: light that ends between the outermost
+  /// ones of the pixel and the next ones may end in the pixel.
+  bool light_ends_at(int x, int y, std::span<const float> shares) const {
+    const int left = (x - range_.left) * scale_, top = (y - range_.top) * scale_,
+              width = (range_.right - range_.left) * scale_, height = (range_.bottom - range_.top) * scale_;
+    const int first = std::max(left - 1, 0), last = std::min(left + scale_ + 1, width);
+    const auto row = [&](int j) {
+      return shares.subspan(
+          static_cast<std::size_t>(j) * static_cast<std::size_t>(width) + static_cast<std::size_t>(first),
+          static_cast<std::size_t>(last - first));
+    };
+    const float own = row(top)[static_cast<std::size_t>(left - first)];
+    for (int j = std::max(top - 1, 0); j < std::min(top + scale_ + 1, height); ++j)
+      for (const float share : row(j))
+        if (share != own) return true;
+    return false;
   }
 
  private:

@@ -79,20 +79,14 @@ void FrameRenderer::add_to_pixels(const Drawing& drawing, std::size_t beam, int 
     return std::max(std::max(highest[left], highest[right]), highest[x]) - own[x] > kSameShare ||
            own[x] - std::min(std::min(lowest[left], lowest[right]), lowest[x]) > kSameShare;
   };
-  const auto masks_differ = [&](int pixel) {
-    const auto of_mask = [&](int sample) { return drawing.mask_share[drawing.masks->index(pixel, sample)]; };
-    for (int k = 0; k < s * s; ++k)
-      if (of_mask(k) != of_mask(-1)) return true;
-    return false;
-  };
   scratch.chosen.clear();
   for (const BeamGroup& group : samples.rows[row].centre_groups) {
     if (!seen.may_light(group.surface)) continue;
     for (std::size_t p = group.first; p < group.last; ++p) {
       if (samples.has_edge[p]) continue;
       const int x = samples.centre[p].pixel - row * width;
-      if (s > 1 &&
-          (differs(x) || (drawing.masks && drawing.masks->holds(x, row) && masks_differ(samples.centre[p].pixel))))
+      if (s > 1 && (differs(x) || (drawing.masks && drawing.masks->holds(x, row) &&
+                                   drawing.masks->light_ends_at(x, row, drawing.mask_share))))
         scratch.chosen.push_back(p);
       else if (own[x] > 0)
         sun[x] += seen.reflected(samples.centre[p], own[x]);

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "rooms.h"
+#include "transom/error.h"
+#include "transom/gl_context.h"
 
 namespace transom {
 namespace {
@@ -155,6 +157,45 @@ TEST(Frame, RaysFindShadeThinnerThanAPixelWhereverItLies) {
                  shade = sum_of_sun(FrameRenderer(open).render(fine, *without_bar, {})) - truth;
     ASSERT_GT(shade, 0.01 * truth);
     EXPECT_NEAR(sum_of_sun(FrameRenderer(engine).render(coarse, *light, {})), truth, 0.2 * shade) << height;
+  }
+}
+
+// A slit's light on the floor, 0.4 pixels wide, seen from above: where most of it is in one column or row, a tenth of a
+// pixel may be in the next, beyond the outermost squares of the stencil.
+TEST(Frame, VolumesFindLightBetweenSquaresOfTheStencilWhereverItLies) {
+  try {
+    const GlContext context;
+  } catch (const GlError& error) {
+    GTEST_SKIP() << error.what();
+  }
+  constexpr double kPixel = 0.02, kWidth = 0.4, kSlitHeight = 3.2;  // [m], [pixels], [m]
+  constexpr int kPlaces = 20;
+  const glm::dvec3 sun(0.1, 0.07, 1);
+  SceneGeometry scene = roof_light_room(0.5f);
+  const auto cover = [&](double from, double to) {
+    test::add_quad(scene, {from, -1, kSlitHeight}, {to, -1, kSlitHeight}, {to, 5, kSlitHeight}, {from, 5, kSlitHeight},
+                   0);
+  };
+  const double slit = 2 + kSlitHeight * sun.x;
+  cover(-1, slit);
+  cover(slit + kPixel * kWidth, 5);
+  const Engine engine(scene, tregenza(), few_rays());
+  Condition condition = uniform_sky(0);
+  condition.beams.push_back({glm::vec3(glm::normalize(sun)), glm::vec3(60000)});
+  const auto light = engine.relight(condition);
+  const double lit = 60000 * glm::normalize(sun).z * 0.5 / std::numbers::pi;
+  View view;
+  view.width = view.height = 32;
+  for (const glm::dvec3& up : {glm::dvec3(0, 1, 0), glm::dvec3(1, 0, 0)}) {
+    for (int place = 0; place < kPlaces; ++place) {
+      view.position = {2 + kPixel * place / kPlaces, 2, 1.5};
+      view.target = {view.position.x, 2, 0};
+      view.up = up;
+      view.vertical_fov_rad = 2 * std::atan(0.5 * view.height * kPixel / view.position.z);
+      const Frame frame = FrameRenderer(engine).render(view, *light, {Visibility::kVolumes});
+      // Sixteen samples, each in a column and a row of its own, say where light ends to 1/32 of a pixel.
+      EXPECT_NEAR(sum_of_sun(frame) * view.width / lit, kWidth, 1.0 / 16 + 1e-3) << place << ' ' << up.x;
+    }
   }
 }
 
