@@ -15,11 +15,7 @@ using test::tregenza;
 using test::uniform_sky;
 
 SolveOptions few_rays() {
-  SolveOptions options;
-  options.target_patch_count = 600;
-  options.patch_samples = {64, 64};
-  options.node_samples = {64, 16};
-  return options;
+  return test::quick(600, {64, 64}, {64, 16});
 }
 
 SceneGeometry turned(SceneGeometry scene) {

@@ -22,11 +22,7 @@ using test::uniform_sky;
 constexpr GatherSamples kSensorSamples{4096, 4096};
 
 SolveOptions small_options() {
-  SolveOptions options;
-  options.target_patch_count = 600;
-  options.patch_samples = {256, 128};
-  options.node_samples = {256, 256};
-  return options;
+  return test::quick(600, {256, 128}, {256, 256});
 }
 
 TEST(Engine, SkyThroughARoofLightMatchesTheClosedForm) {

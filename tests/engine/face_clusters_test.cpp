@@ -24,11 +24,7 @@ SceneGeometry room_with_crumbs() {
 }
 
 SolveOptions few_patches() {
-  SolveOptions options;
-  options.target_patch_count = 100;
-  options.patch_samples = {128, 32};
-  options.node_samples = {64, 32};
-  return options;
+  return test::quick(100, {128, 32}, {64, 32});
 }
 
 TEST(FaceClusters, SidesIndoorsAndOutdoorsAreNotTakenTogether) {

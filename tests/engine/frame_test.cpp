@@ -18,11 +18,7 @@ using test::tregenza;
 using test::uniform_sky;
 
 SolveOptions few_rays() {
-  SolveOptions options;
-  options.target_patch_count = 400;
-  options.patch_samples = {128, 64};
-  options.node_samples = {128, 64};
-  return options;
+  return test::quick(400, {128, 64}, {128, 64});
 }
 
 View into_the_room() {

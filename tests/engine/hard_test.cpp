@@ -23,11 +23,7 @@ using test::tregenza;
 using test::uniform_sky;
 
 SolveOptions small_options() {
-  SolveOptions options;
-  options.target_patch_count = 300;
-  options.patch_samples = {256, 128};
-  options.node_samples = {64, 64};
-  return options;
+  return test::quick(300, {256, 128}, {64, 64});
 }
 
 double imbalance(const SceneGeometry& scene, glm::vec3 to_sun) {

@@ -13,11 +13,7 @@ using test::tregenza;
 using test::uniform_sky;
 
 SolveOptions small_options() {
-  SolveOptions options;
-  options.target_patch_count = 600;
-  options.patch_samples = {128, 64};
-  options.node_samples = {64, 64};
-  return options;
+  return test::quick(600, {128, 64}, {64, 64});
 }
 
 Condition sunny(glm::vec3 to_sun, glm::vec3 illuminance) {

@@ -51,6 +51,15 @@ inline Condition uniform_sky(float luminance, float ground = 0) {
   return condition;
 }
 
+/// A solve of few patches and rays.
+inline SolveOptions quick(int patch_count, GatherSamples patch_samples, GatherSamples node_samples) {
+  SolveOptions options;
+  options.target_patch_count = patch_count;
+  options.patch_samples = patch_samples;
+  options.node_samples = node_samples;
+  return options;
+}
+
 /// A 4 x 4 x 3 m room with an unglazed hole, of 2 x 2 m in the middle of its roof, and walls of the given reflectance.
 inline SceneGeometry roof_light_room(float reflectance, float transmittance = 1) {
   SceneGeometry scene;

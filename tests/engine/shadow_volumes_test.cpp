@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "shadow_casters.h"
+#include "shadow_scene.h"
 #include "transom/error.h"
 
 #if defined(__SANITIZE_ADDRESS__)
@@ -29,44 +29,7 @@ extern "C" const char* __lsan_default_suppressions() {
 namespace transom {
 namespace {
 
-struct TestScene {
-  std::vector<glm::vec3> vertices;
-  std::vector<glm::uvec3> opaque;
-  std::vector<std::vector<glm::uvec3>> openings;
-
-  /// Two triangles with vertices of their own, as meshes with normals have them. group -1: opaque.
-  void add_quad(glm::vec3 corner, glm::vec3 u, glm::vec3 v, int group = -1) {
-    const auto first = static_cast<std::uint32_t>(vertices.size());
-    for (const glm::vec3& vertex : {corner, corner + u, corner + u + v, corner + v}) vertices.push_back(vertex);
-    if (group >= static_cast<int>(openings.size())) openings.resize(static_cast<std::size_t>(group) + 1);
-    auto& triangles = group < 0 ? opaque : openings[static_cast<std::size_t>(group)];
-    triangles.emplace_back(first, first + 1, first + 2);
-    triangles.emplace_back(first, first + 2, first + 3);
-  }
-
-  /// A closed box, normals outwards.
-  void add_box(glm::vec3 low, glm::vec3 high, bool inwards = false) {
-    const glm::vec3 x(high.x - low.x, 0, 0), y(0, high.y - low.y, 0), z(0, 0, high.z - low.z);
-    const auto side = [&](glm::vec3 corner, glm::vec3 u, glm::vec3 v) {
-      inwards ? add_quad(corner, v, u) : add_quad(corner, u, v);
-    };
-    side(low, y, x), side(low, x, z), side(low, z, y);
-    side(low + z, x, y), side(low + y, z, x), side(low + x, y, z);
-  }
-
-  /// A wall in the plane y = constant from x = 0 to `width`, with holes given by (low x, low z, high x, high z), cut
-  /// into strips that leave T-junctions.
-  void add_facade(float y, float width, float height, const std::vector<glm::vec4>& holes) {
-    float x = 0;
-    for (const glm::vec4& hole : holes) {
-      add_quad({x, y, 0}, {hole.x - x, 0, 0}, {0, 0, height});
-      add_quad({hole.x, y, 0}, {hole.z - hole.x, 0, 0}, {0, 0, hole.y});
-      add_quad({hole.x, y, hole.w}, {hole.z - hole.x, 0, 0}, {0, 0, height - hole.w});
-      x = hole.z;
-    }
-    add_quad({x, y, 0}, {width - x, 0, 0}, {0, 0, height});
-  }
-};
+using test::TestScene;
 
 /// A room of single sheets, 6 x 5 x 3 m, a south facade with two windows of two panes each and one behind the other in
 /// part; closed boxes (one of them turned inside out, two of them interpenetrating), open sheets of both orientations.
@@ -410,41 +373,6 @@ TEST_P(ShadowVolumesTest, TwoContextsAndTwoScenesDoNotDisturbEachOther) {
 
 INSTANTIATE_TEST_SUITE_P(Backends, ShadowVolumesTest, ::testing::Values(GlBackend::kOsmesa, GlBackend::kEgl),
                          [](const auto& test) { return test.param == GlBackend::kOsmesa ? "Osmesa" : "Egl"; });
-
-TEST(ShadowCastersTest, SilhouetteOfACubeIsAHexagon) {
-  TestScene scene;
-  scene.add_box({0, 0, 0}, {1, 1, 1});
-  const auto welded = weld_vertices(scene.vertices);
-  const glm::dvec3 sun = glm::normalize(glm::dvec3(1, 2, 3));
-  const ShadowCasters solid(scene.vertices, welded, scene.opaque, CasterCount::kSolidsOnce);
-  EXPECT_EQ(solid.volume(sun, 99).indices.size(), 3U * (6 + 6));  // three lit faces and six silhouette edges
-  const ShadowCasters sheets(scene.vertices, welded, scene.opaque, CasterCount::kEveryTriangle);
-  EXPECT_EQ(sheets.volume(sun, 99).indices.size(), 3U * (12 + 2 * 6));  // both shells
-  EXPECT_EQ(sheets.volume(sun, 99).clockwise_count, 3U * 6);
-}
-
-TEST(ShadowCastersTest, CastersWhoseShadeFallsElsewhereAreLeftOut) {
-  TestScene scene;
-  scene.add_box({0, 0, 1}, {1, 1, 2});
-  scene.add_box({4, 0, 1}, {5, 1, 2});
-  const ShadowCasters casters(scene.vertices, weld_vertices(scene.vertices), scene.opaque, CasterCount::kSolidsOnce);
-  const glm::dvec3 sun(0, 0, 1);
-  const auto corners_for = [&](glm::vec3 low, glm::vec3 high) {
-    const std::vector<std::pair<glm::vec3, glm::vec3>> boxes{{low, high}};
-    return casters.volume(sun, 99, scene.vertices, ShadedPoints(sun, boxes)).indices.size();
-  };
-  EXPECT_EQ(corners_for({-1, -1, 0}, {6, 2, 0}), casters.volume(sun, 99).indices.size());
-  EXPECT_EQ(corners_for({0, 0, 0}, {1, 1, 0}), casters.volume(sun, 99).indices.size() / 2);
-  EXPECT_EQ(corners_for({2, 0, 0}, {3, 1, 0}), 0U);  // between them
-  const std::vector<std::pair<glm::vec3, glm::vec3>> apart{{{-1, 0, 0}, {-0.5F, 1, 0}}, {{5.5F, 0, 0}, {6, 1, 0}}};
-  EXPECT_EQ(casters.volume(sun, 99, scene.vertices, ShadedPoints(sun, apart)).indices.size(), 0U);  // beside both
-  EXPECT_EQ(corners_for({0, 0, 3}, {5, 1, 4}), 0U);                                                 // above both
-}
-
-TEST(ShadowCastersTest, WeldsEqualPositionsOnly) {
-  const std::vector<glm::vec3> vertices{{1, 2, 3}, {0, 0, 0}, {1, 2, 3}, {-0.0F, 0, 0}, {1, 2, 3.0001F}};
-  EXPECT_EQ(weld_vertices(vertices), (std::vector<std::uint32_t>{0, 1, 0, 1, 4}));
-}
 
 TEST(GlContextTest, SaysWhatItIs) {
   try {

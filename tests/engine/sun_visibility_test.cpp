@@ -16,11 +16,7 @@ using test::tregenza;
 using test::uniform_sky;
 
 SolveOptions few_rays() {
-  SolveOptions options;
-  options.target_patch_count = 200;
-  options.patch_samples = {64, 16};
-  options.node_samples = {64, 16};
-  return options;
+  return test::quick(200, {64, 16}, {64, 16});
 }
 
 TEST(SunVisibility, WeightsOfPlacesAreTheFluxThatSurfacesWouldReceive) {
