@@ -190,8 +190,8 @@ class Engine:
             raise InputError(str(error), file=self.scene.file, field=f"conditions.{condition.name}") from None
 
     def sun_plan(self, condition: Condition) -> SunPlan:
-        """How many sub-suns the scene asks for under a condition's sun: 1, a point, unless much of its light indoors is
-        in penumbras, as behind louvres."""
+        """How many sub-suns the scene asks for under a condition's sun: as few as err by TOLERANCE of the sun's mean
+        illuminance at places indoors. 1, a point, behind plain windows; more behind louvres."""
         if condition.sun_direction is None:
             return SunPlan()
         x, y, z = condition.sun_direction.tolist()

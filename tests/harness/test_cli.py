@@ -38,6 +38,8 @@ def test_help_of_every_command_has_an_example(command: str, capsys: pytest.Captu
         (["render", "test_room", "--sun", "disc:8", "-o", "a.png"], ["--sun", "disc:8", "auto"]),
         (["sensors", "desk_office", "--sun", "square", "-o", "a.csv"], ["--sun", "square", "auto"]),
         (["render", "test_room", "--renderer", "pencil", "-o", "a.png"], ["pencil"]),
+        (["render", "test_room", "--renderer", "mitsuba", "--sun", "disc", "-o", "a.png"], ["--sun", "engine"]),
+        (["sensors", "desk_office", "--renderer", "radiance", "--sun", "auto", "-o", "a.csv"], ["--sun", "engine"]),
         (["render", "test_room"], ["-o"]),
         (["render"], ["SCENE"]),
         (["sensors", "test_room", "--points", "no.csv", "-o", "a.csv"], ["no.csv"]),

@@ -19,13 +19,12 @@ from transom.errors import InputError
 from transom.fenestration.reglazing import reglazed
 from transom.hard.changes import sunlit
 from transom.hard.claims import QUICK, Case, Lit
-from transom.hard.disc_cases import direct_share, disc_cases, penumbra_places, share_beyond
+from transom.hard.disc_cases import LOW_SUN, direct_share, disc_cases, penumbra_places, share_beyond
 from transom.hard.rooms import ROOM_M, Point, Room, windowed_room
 from transom.hard.shape_cases import louvre_room
 from transom.hard.sun_cases import roof_light_room
 from transom.scene.model import View
 
-LOW_SUN: Point = (0.3, -1.0, 0.5)
 OVERHEAD: Point = (0.0, 0.0, 1.0)
 EDGE = ((1.0, 1.5, ROOM_M[2]), (1.0, 3.5, ROOM_M[2]), (9.0, 2.5, ROOM_M[2]))
 
@@ -88,13 +87,16 @@ def test_places_that_see_the_whole_disc_have_exactly_the_light_of_a_point() -> N
 
 
 def test_one_sub_sun_is_the_point_bit_by_bit() -> None:
-    """And the default: nothing that was computed before has changed."""
     room = lit(louvre_room(20))
     room.engine.relight(room.condition)
     first = room.engine.render(from_window()).radiance
     room.engine.relight(room.condition, 19)
     disc = room.engine.render(from_window()).radiance
-    room.engine.relight(room.condition, 1)
+    core = engine_condition(room.scene, room.condition, room.engine.sky_bins, 1)
+    sun = room.condition.sun_direction
+    assert sun is not None
+    core.add_sub_sun(tuple(sun.tolist()), tuple(room.condition.sun_illuminance_rgb.tolist()))
+    room.engine._core.relight(core)
     assert np.array_equal(room.engine.render(from_window()).radiance, first)
     assert not np.array_equal(disc, first)
 
@@ -169,7 +171,9 @@ def test_plan_of_the_run_bundle_says_how_many_sub_suns_and_why() -> None:
     options = {"sun": "auto", "target_patch_count": QUICK.target_patch_count}
     facts = EngineRenderer().render(room.scene, room.condition, from_window(8, 6), options).facts
     plan = facts["plan"]
-    assert plan["sub_suns"] > 1 and plan["point_error"] > 0.1 >= plan["error"] and plan["penumbra_share"] > 0.3
+    assert (
+        plan["sub_suns"] > 1 and plan["point_sun_error"] > 0.1 >= plan["sub_sun_error"] and plan["penumbra_share"] > 0.3
+    )
     plain = EngineRenderer().render(room.scene, room.condition, from_window(8, 6), {**options, "sun": "point"}).facts
     assert plain["plan"]["sub_suns"] == 1
 

@@ -87,3 +87,13 @@ def checked_output(path: Path, endings: tuple[str, ...]) -> Path:
     if not path.absolute().parent.is_dir():
         raise InputError("is in a folder that does not exist", field="-o", value=str(path), remedy="Make it first")
     return path
+
+
+def checked_sun(sun: str, renderer: RendererName) -> None:
+    """Raises InputError for what is no sun, and for any but a point where another program than the engine renders."""
+    from transom.daylight.sun_disc import parse_sun
+
+    if parse_sun(sun, "--sun") != 1 and renderer is not RendererName.engine:
+        raise InputError(
+            "is a form that the engine's sun alone can have", field="--sun", value=sun, remedy="Leave it out"
+        )

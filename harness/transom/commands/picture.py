@@ -7,7 +7,15 @@ from typing import Annotated
 
 import typer
 
-from transom.commands.choices import Method, RendererName, Visibility, checked_output, chosen_condition, chosen_view
+from transom.commands.choices import (
+    Method,
+    RendererName,
+    Visibility,
+    checked_output,
+    checked_sun,
+    chosen_condition,
+    chosen_view,
+)
 
 SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help="Name of a scene, or the path of a scene folder.")]
 TimeOption = Annotated[
@@ -65,11 +73,10 @@ def render(
     \b
     Example:  transom render desk_office --time 2026-06-21T12:00 --sky clear --size 640x480 -o office.exr
               transom render test_room --glazing south_upper=laser_cut_panel -o panel.png
-              transom render partition_office --sun auto -o louvres.png
+              transom render partition_office --sun disc -o penumbras.png
     """
     from transom.bundle import make_case
     from transom.daylight.condition import resolve_condition
-    from transom.daylight.sun_disc import parse_sun
     from transom.fenestration.reglazing import load_glazed
     from transom.images import write_picture
     from transom.progress import single_progress
@@ -81,7 +88,7 @@ def render(
     chosen = chosen_view(loaded, view, size)
     resolved = resolve_condition(chosen_condition(loaded, condition, time, sky), loaded.site)
     worker = load_renderer(renderer.value)
-    parse_sun(sun, "--sun")
+    checked_sun(sun, renderer)
     is_engine = renderer is RendererName.engine
     options = {"visibility": visibility.value, "method": method.value, "sun": sun} if is_engine else {}
     target = None if is_engine else Target(noise or DEFAULT_PICTURE_NOISE_PERCENT)

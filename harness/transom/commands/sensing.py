@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from transom.commands.choices import RendererName, checked_output, chosen_condition
+from transom.commands.choices import RendererName, checked_output, checked_sun, chosen_condition
 from transom.commands.picture import (
     ConditionOption,
     GlazingOption,
@@ -43,7 +43,6 @@ def sensors(
     """
     from transom.bundle import make_case
     from transom.daylight.condition import resolve_condition
-    from transom.daylight.sun_disc import parse_sun
     from transom.fenestration.reglazing import load_glazed
     from transom.progress import single_progress
     from transom.renderer import load_renderer
@@ -57,7 +56,7 @@ def sensors(
         raise InputError("has no sensors", file=loaded.file, remedy="Give --points FILE.csv")
     resolved = resolve_condition(chosen_condition(loaded, condition, time, sky), loaded.site)
     worker = load_renderer(renderer.value)
-    parse_sun(sun, "--sun")
+    checked_sun(sun, renderer)
     options = {"sun": sun} if renderer is RendererName.engine else {}
     target = None if renderer is RendererName.engine else Target(noise or SENSOR_TARGET_PERCENT)
     case = make_case(loaded, resolved, worker, options, sensors=table)

@@ -40,7 +40,7 @@ SUN_FORMS = f'Use "point", "auto", "disc", or "disc:N" with N = {", ".join(map(s
 FIRST_PROBES, PROBES = 19, 127
 """Sub-suns that places are asked for to find those that the sun reaches, and to know what these see of the disc."""
 
-PLACES = 8000
+MOST_PLACES = 8000
 """Most places that are asked: of a hall of 30,000 patches as many as of a room of 8,000."""
 
 PARTIAL = 0.1
@@ -101,14 +101,14 @@ class SunPlan:
     """Sub-suns of a condition, and why so many.
 
     penumbra_share: of the sun's light on surfaces of rooms, what falls on places that see a part of the disc.
-    point_error, error: of its illuminance at places, in the mean and relative to its mean, with a point and with these
+    point_sun_error, sub_sun_error: of its illuminance at places, in the mean and relative to its mean, with a point and with these
     sub-suns. All three are 0 where nobody asked, or no sun comes in.
     """
 
     sub_suns: int = 1
     penumbra_share: float = 0.0
-    point_error: float = 0.0
-    error: float = 0.0
+    point_sun_error: float = 0.0
+    sub_sun_error: float = 0.0
 
     def facts(self) -> dict[str, float]:
         """For the run bundle."""
@@ -122,7 +122,7 @@ def plan_sun(direction: Float64, shares: Shares, weights: Float32) -> SunPlan:
     of 1 lx on what each of all places stands for. A point is enough where penumbras, a hundredth as wide as light's way
     from what casts them, are narrow beside what is lit; behind louvres with gaps of a few penumbras it is not.
     """
-    asked = np.arange(0, len(weights), -(-len(weights) // PLACES) or 1)
+    asked = np.arange(0, len(weights), -(-len(weights) // MOST_PLACES) or 1)
     lit = asked[shares(sub_suns(direction, FIRST_PROBES), asked).any(axis=1)]
     seen = shares(sub_suns(direction, PROBES), lit).astype(np.float64)
     mean, weights = seen.mean(axis=1), weights[lit]

@@ -18,7 +18,7 @@ from transom.hard.shape_cases import louvre_room
 from transom.hard.sun_cases import roof_light_room
 
 Float64 = NDArray[np.float64]
-Strip = tuple[Point, Point, Point]
+Edge = tuple[Point, Point, Point]
 
 GROUP = "sun"
 
@@ -38,6 +38,11 @@ LOW_SUN: Point = (0.3, -1.0, 0.5)
 BLADES = 25
 
 
+def unglazed_louvres() -> Room:
+    """A room behind BLADES blades in its open window."""
+    return replace(louvre_room(BLADES), openings={"glass": None})
+
+
 def disc_cases() -> list[Case]:
     roof = roof_light_room()
     height = ROOM_M[2]
@@ -46,7 +51,7 @@ def disc_cases() -> list[Case]:
     wire = [((x, 1.5, 2.9), (x, 3.5, 2.9), (9.0, 2.5, 2.9)) for x in (2.0, 2.004)]
     wired = roof.with_polygons(quad((2.0, 0.5, 2.9), (2.004, 0.5, 2.9), (2.004, 4.5, 2.9), (2.0, 4.5, 2.9)))
     overhead, oblique = (0.0, 0.0, 1.0), (-0.6, 0.4, 0.9)
-    louvres = replace(louvre_room(BLADES), openings={"glass": None})
+    louvres = unglazed_louvres()
     lit = Lit(louvres, lambda condition: sunlit(condition, LOW_SUN), sun=COUNT)
     return [
         Case("disc past an edge", GROUP, (_penumbra(roof, overhead, [edge]),)),
@@ -63,7 +68,7 @@ def _room(lit: Lit) -> tuple[Claim, ...]:
     return tuple(mirrored if claim.name == mirrored.name else claim for claim in room_claims(lit))
 
 
-def share_beyond(points: Float64, edge: Strip, sun: Float64) -> Float64:
+def share_beyond(points: Float64, edge: Edge, sun: Float64) -> Float64:
     """Share (N,) of a uniform disc around the unit vector `sun` (3,) that points (N, 3) see beyond a straight edge.
 
     edge: two of its points, and one beyond it. The plane through a point and the edge divides the disc: exact but for
@@ -88,7 +93,7 @@ def direct_share(lit: Lit, points: Float64) -> Float64:
     return found
 
 
-def penumbra_places(edge: Strip, sun: Float64, height_m: float = 0.5) -> Float64:
+def penumbra_places(edge: Edge, sun: Float64, height_m: float = 0.5) -> Float64:
     """Points (PLACES, 3) at a height along x, across the shadow of an edge's middle and beyond it on both sides."""
     middle = (np.array(edge[0]) + np.array(edge[1])) / 2
     way = (middle[2] - height_m) / sun[2]
@@ -97,7 +102,7 @@ def penumbra_places(edge: Strip, sun: Float64, height_m: float = 0.5) -> Float64
     return points
 
 
-def _penumbra(room: Room, towards: Point, edges: Sequence[Strip], *, blocked: bool = False) -> Claim:
+def _penumbra(room: Room, towards: Point, edges: Sequence[Edge], *, blocked: bool = False) -> Claim:
     """edges: light comes from beyond the first and not from beyond the second; blocked: the other way round."""
     lit = Lit(room, lambda condition: sunlit(condition, towards), sun=COUNT)
 
