@@ -347,12 +347,19 @@ NB_MODULE(_engine, m) {
       .def(
           "places_facing",
           [](const Session& s, std::tuple<float, float, float> direction) {
-            Places places = places_facing(s.engine, vector_of(direction));
+            Places places;
+            {
+              const nb::gil_scoped_release release;
+              places = places_facing(s.engine, vector_of(direction));
+            }
             const std::size_t n = places.points.size();
             return nb::make_tuple(to_array<float>(std::move(places.points), {n, 3}),
                                   to_array<float>(std::move(places.weights), {n}));
           },
-          "direction"_a, "Places on patches of rooms, for `shares_from`, and the flux that 1 lx brings to each [lm].")
+          "direction"_a,
+          "Places (N, 3) on patches of rooms in the engine's frame [m], for `shares_from`, and the flux (N,) that 1 "
+          "lx\n"
+          "brings to each [lm]. direction: unit, towards the source.")
       .def(
           "shares_from",
           [](const Session& s, In<float, nb::shape<-1, 3>> points, In<float, nb::shape<-1, 3>> directions) {
@@ -364,7 +371,9 @@ NB_MODULE(_engine, m) {
             }
             return to_array<float>(std::move(shares), {from.size(), to.size()});
           },
-          "points"_a, "directions"_a, "Share of parallel light from each direction that arrives at each place.")
+          "points"_a, "directions"_a,
+          "Share (N, M), 0..1, of parallel light from each unit direction (M, 3) that arrives at each place (N, 3) of\n"
+          "`places_facing`.")
       .def(
           "audit",
           [](const Session& s, int rays_per_opening) {

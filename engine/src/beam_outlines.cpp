@@ -44,7 +44,7 @@ BeamOutlines::BeamOutlines(const Faces& faces, const std::vector<int>& passages,
   for (const int f : passages) {
     const Face& face = faces.faces[static_cast<std::size_t>(f)];
     Passage passage;
-    passage.outline = outline({face.corner, face.is_quad ? 4u : 3u});
+    passage.outline = outline(face.corners());
     const float facing = glm::dot(face.normal, towards_), sense = facing > 0 ? 1.f : -1.f;
     passage.is_edge_on = std::abs(facing) < kEdgeOn;
     for (int k = 0; k < passage.outline.corner_count; ++k) {
@@ -77,12 +77,17 @@ BeamOutline BeamOutlines::outline(std::span<const glm::vec3> corners) const {
   return result;
 }
 
-bool BeamOutlines::covers(int k, const BeamOutline& polygon) const {
+bool BeamOutlines::may_cover(int k, glm::vec3 low, glm::vec3 high) const {
   const BeamOutline& passage = passages_[static_cast<std::size_t>(k)].outline;
-  if (passage.farthest < polygon.nearest - margin_) return false;
+  if (passage.farthest < low.z - margin_) return false;
   for (int axis = 0; axis < 2; ++axis)
-    if (passage.low[axis] > polygon.high[axis] + margin_ || polygon.low[axis] > passage.high[axis] + margin_)
-      return false;
+    if (passage.low[axis] > high[axis] + margin_ || low[axis] > passage.high[axis] + margin_) return false;
+  return true;
+}
+
+bool BeamOutlines::covers(int k, const BeamOutline& polygon) const {
+  if (!may_cover(k, {polygon.low, polygon.nearest}, {polygon.high, polygon.farthest})) return false;
+  const BeamOutline& passage = passages_[static_cast<std::size_t>(k)].outline;
   return !has_separating_edge(passage, polygon, margin_) && !has_separating_edge(polygon, passage, margin_);
 }
 

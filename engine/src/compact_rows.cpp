@@ -64,7 +64,8 @@ inline __m128 four(const float* weights) {
 }
 
 // Four running sums of four channels each: entries k to k + 3 of a row go to one each. With registers of eight floats
-// two sums share one, and are the same. Value: two values for such a register, or one for half of it.
+// two sums share one, and are the same. ValueOf: two values for such a register, or one
+// for half of it.
 class FourSums {
  public:
 #ifdef __AVX2__

@@ -11,8 +11,8 @@ bool is_convex_room(const Faces& faces) {
   return std::all_of(faces.faces.begin(), faces.faces.end(), [&](const Face& face) {
     bool has_front = false, has_back = false;
     for (const Face& other : faces.faces)
-      for (int k = 0; k < (other.is_quad ? 4 : 3); ++k) {
-        const float height = glm::dot(other.corner[k] - face.corner[0], face.normal);
+      for (const glm::vec3& corner : other.corners()) {
+        const float height = glm::dot(corner - face.corner[0], face.normal);
         has_front |= height > rounding;
         has_back |= height < -rounding;
         if (has_front && has_back) return false;

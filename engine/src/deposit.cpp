@@ -1,6 +1,5 @@
 #include "transom/deposit.h"
 
-#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -102,8 +101,7 @@ DirectLight::Points DirectLight::points_on(int slot_index, const Corners& corner
   Points points;
   points.resize(elements.size() * samples);
   const bool is_quad = mesh_.grid(slot.face).is_quad;
-  const int per_slot = mesh_.elements_per_slot(),
-            edge = static_cast<int>(std::lround(std::sqrt(static_cast<float>(per_slot))));
+  const int per_slot = mesh_.elements_per_slot(), edge = mesh_.elements_per_edge();
   const float part = 1 / static_cast<float>(edge);
   // A cell, and a quad's element in it, is the affine or bilinear picture of its own square or triangle.
   const glm::vec3 a = corners[0], ab = corners[1] - a, ac = corners[3] - a, twist = corners[2] - a - ab - ac;

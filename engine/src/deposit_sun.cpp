@@ -56,7 +56,7 @@ std::vector<DirectLight::SunlitSlot> DirectLight::reached(const Sun& sun, const 
       continue;
     const int f = mesh_.slot(receivers.slots[i]).face;
     const Face& face = mesh_.faces().faces[f];
-    if (f != known_face) sun.outlines.covering(sun.outlines.outline({face.corner, face.is_quad ? 4u : 3u}), over_face);
+    if (f != known_face) sun.outlines.covering(sun.outlines.outline(face.corners()), over_face);
     known_face = f;
     const BeamOutline outline = sun.outlines.outline(receivers.corners[i]);
     over_slot.clear();
@@ -151,8 +151,7 @@ std::vector<int> DirectLight::partly_lit(int slot_index, const std::vector<int>&
                                          const std::vector<float>& share, const std::vector<float>& evenly_lit) const {
   const Slot slot = mesh_.slot(slot_index);
   const Grid& grid = mesh_.grid(slot.face);
-  const int per_slot = mesh_.elements_per_slot(),
-            edge = static_cast<int>(std::lround(std::sqrt(static_cast<float>(per_slot))));
+  const int per_slot = mesh_.elements_per_slot(), edge = mesh_.elements_per_edge();
   const auto sample = [&](int of_slot, int element, int i) {
     const int place = place_of_slot[of_slot];
     return place < 0 ? 0.f : share[(static_cast<std::size_t>(place) * per_slot + element) * kSamplesPerElement + i];

@@ -1,11 +1,7 @@
 #include "transom/engine.h"
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
 #include <numbers>
-#include <numeric>
-#include <unordered_map>
 
 #include "streams.h"
 #include "transom/overlap.h"

@@ -214,26 +214,6 @@ Sensors Engine::sensors(const std::vector<glm::dvec3>& points, const std::vector
   return sensors;
 }
 
-// What elements send as the nodes around them say, less what their patches do.
-std::vector<Share> Engine::resolved_by_nodes(const std::vector<Share>& elements) const {
-  const int per_slot = mesh_->elements_per_slot(), node_count = static_cast<int>(nodes_->nodes().size());
-  std::vector<Share> row;
-  for (const Share& share : elements) {
-    const int patch = patch_of_slot_[share.index / per_slot];
-    if (patch < 0) continue;
-    const Slot slot = mesh_->slot(share.index / per_slot);
-    const glm::vec2 middle = mesh_->grid(slot.face).is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3),
-                    st = mesh_->element_parameters(slot.face, slot.cell, share.index % per_slot, middle);
-    const NodeShares nodes =
-        nodes_->interpolate(slot.face, slot.side, st, mesh_->lifted_position(slot.face, slot.side, st));
-    if (nodes.count == 0) continue;
-    for (int k = 0; k < nodes.count; ++k) row.push_back({nodes.node[k], share.weight * nodes.weight[k]});
-    row.push_back({node_count + patch, -share.weight});
-  }
-  merge_shares(row);
-  return row;
-}
-
 std::vector<Irradiance> Engine::illuminance(const Lighting& lighting, const Sensors& sensors) const {
   std::vector<Irradiance> result(sensors.nodes.size());
   const FirstBounce first_bounce(*mesh_, *rays_, lighting.bright_elements);

@@ -167,33 +167,38 @@ void Engine::gather_new_nodes(NodeTrial& trial, int first_part, Known& known) {
   nodes_->expose(is_exposed, first_part);
 }
 
+// What elements send as the nodes around them say, less what their patches do.
+std::vector<Share> Engine::resolved_by_nodes(const std::vector<Share>& elements) const {
+  const int per_slot = mesh_->elements_per_slot(), node_count = static_cast<int>(nodes_->nodes().size());
+  std::vector<Share> row;
+  for (const Share& share : elements) {
+    const int patch = patch_of_slot_[share.index / per_slot];
+    if (patch < 0) continue;
+    const NodeShares& nodes = nodes_at_element_[static_cast<std::size_t>(patch * per_slot + share.index % per_slot)];
+    if (nodes.count == 0) continue;
+    for (int k = 0; k < nodes.count; ++k) row.push_back({nodes.node[k], share.weight * nodes.weight[k]});
+    row.push_back({node_count + patch, -share.weight});
+  }
+  merge_shares(row);
+  return row;
+}
+
 // Close by it matters that the light of a patch is not even: its elements get theirs from the nodes around them.
 void Engine::resolve_near_light(const NodeTrial& trial) {
   const int per_slot = mesh_->elements_per_slot();
-  const std::size_t node_count = nodes_->nodes().size();
-  std::vector<NodeShares> at_element(slot_of_patch_.size() * static_cast<std::size_t>(per_slot));
+  nodes_at_element_.assign(slot_of_patch_.size() * static_cast<std::size_t>(per_slot), {});
   parallel_indices(slot_of_patch_.size(), kGrain, [&](std::size_t p) {
     if (mesh_->is_cluster(slot_of_patch_[p])) return;
     const Slot slot = mesh_->slot(slot_of_patch_[p]);
-    const glm::vec2 middle = mesh_->grid(slot.face).is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3);
+    const glm::vec2 middle = mesh_->grid(slot.face).middle();
     for (int e = 0; e < per_slot; ++e) {
       const glm::vec2 st = mesh_->element_parameters(slot.face, slot.cell, e, middle);
-      at_element[p * static_cast<std::size_t>(per_slot) + static_cast<std::size_t>(e)] =
+      nodes_at_element_[p * static_cast<std::size_t>(per_slot) + static_cast<std::size_t>(e)] =
           nodes_->interpolate(slot.face, slot.side, st, mesh_->lifted_position(slot.face, slot.side, st));
     }
   });
-  std::vector<std::vector<Share>> rows(node_count);
-  parallel_indices(node_count, kGrain, [&](std::size_t i) {
-    for (const Share& share : trial.rows[i].near) {
-      const int patch = patch_of_slot_[share.index / per_slot];
-      if (patch < 0) continue;
-      const NodeShares& nodes = at_element[patch * per_slot + share.index % per_slot];
-      if (nodes.count == 0) continue;
-      for (int k = 0; k < nodes.count; ++k) rows[i].push_back({nodes.node[k], share.weight * nodes.weight[k]});
-      rows[i].push_back({static_cast<int>(node_count) + patch, -share.weight});
-    }
-    merge_shares(rows[i]);
-  });
+  std::vector<std::vector<Share>> rows(nodes_->nodes().size());
+  parallel_indices(rows.size(), kGrain, [&](std::size_t i) { rows[i] = resolved_by_nodes(trial.rows[i].near); });
   for (const std::vector<Share>& row : rows) node_near_.append(row);
 }
 

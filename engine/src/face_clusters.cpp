@@ -1,7 +1,6 @@
 #include "transom/face_clusters.h"
 
 #include <algorithm>
-#include <numeric>
 #include <unordered_set>
 
 #include "transom/parallel.h"
@@ -13,12 +12,6 @@ constexpr float kSmallEdge = 0.5f;    // of the longest edge of patches
 constexpr double kBearableFaces = 2;  // for each patch wanted
 constexpr float kCubeGrowth = 1.25f;
 constexpr std::uint64_t kCubesPerAxis = 1u << 12;  // at most
-
-int main_direction(glm::vec3 n) {
-  const glm::vec3 a = glm::abs(n);
-  const int axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
-  return 2 * axis + (n[axis] < 0);
-}
 
 glm::vec3 normal_of(const Faces& faces, int side) {
   const glm::vec3 n = faces.faces[side / 2].normal;

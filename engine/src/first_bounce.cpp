@@ -10,7 +10,6 @@ namespace transom {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
-constexpr float kFar = 4;  // diameters from which a patch counts as a point: then it errs by about 1 % of its share
 constexpr float kAdjacent = 3;         // diameters below which an element needs its closed form
 constexpr float kRaysPerShare = 2000;  // rays to an element for each 1 of form factor
 constexpr int kMostRays = 64;          // to one element
@@ -111,7 +110,7 @@ glm::vec3 FirstBounce::irradiance(glm::vec3 point, glm::vec3 normal, Rays precis
     const float height = -glm::dot(to_patch, patch.normal);
     if (height <= 0 && !patch.is_cluster) continue;  // all of a planar patch is seen from behind
     const float distance2 = glm::dot(to_patch, to_patch);
-    if (precision == Rays::kOne && !patch.is_cluster && distance2 > kFar * kFar * patch.size * patch.size) {
+    if (precision == Rays::kOne && !patch.is_cluster && distance2 > kFarPatch * kFarPatch * patch.size * patch.size) {
       const float cosine = glm::dot(to_patch, normal);
       if (cosine > 0) connect(patch.centroid, patch.flux * (cosine * height / (kPi * distance2 * distance2)));
       continue;

@@ -185,7 +185,7 @@ Frame FrameRenderer::render(const View& view, const Lighting& lighting, FrameOpt
   if (options.visibility == Visibility::kVolumes) {
     for (std::size_t b = 0; b < beams.size(); ++b) {
       drawing.beams.clear();
-      drawing.beams.emplace_back(engine_, *beams[b], samples_->surfaces, is_enclosed_);
+      drawing.beams.emplace_back(engine_, *beams[b], *samples_, is_enclosed_);
       const Masks masks(view, samples_->edge_samples, lit_range(drawing.beams[0]));
       {
         const TracePhase volume_phase(engine_.trace(), "volumes");
@@ -199,7 +199,7 @@ Frame FrameRenderer::render(const View& view, const Lighting& lighting, FrameOpt
     if (beams.empty()) draw(drawing);
   } else {
     const TracePhase pixel_phase(engine_.trace(), "light of the picture");
-    for (const Beam* beam : beams) drawing.beams.emplace_back(engine_, *beam, samples_->surfaces, is_enclosed_);
+    for (const Beam* beam : beams) drawing.beams.emplace_back(engine_, *beam, *samples_, is_enclosed_);
     draw(drawing);
   }
   frame.edge_pixel_count = static_cast<int>(std::count(is_edge_.begin(), is_edge_.end(), 1));

@@ -24,13 +24,13 @@ void ShadowRays::trace(const RayScene& scene, RayScene::What what) {
   shares_.clear();
 }
 
-SeenBeam::SeenBeam(const Engine& engine, const Beam& beam, std::span<const int> surfaces,
+SeenBeam::SeenBeam(const Engine& engine, const Beam& beam, const ViewSamples& samples,
                    const std::vector<char>& is_enclosed)
     : engine_(&engine),
       beam_(&beam),
+      samples_(&samples),
       is_enclosed_(&is_enclosed),
-      may_light_(is_enclosed.size(), 0),
-      margin_(engine.faces().ray_offset()) {
+      may_light_(samples.surfaces.size(), 0) {
   const std::vector<Face>& faces = engine.faces().faces;
   const bool is_sun = beam.opening < 0;
   if (is_sun) {
@@ -38,23 +38,16 @@ SeenBeam::SeenBeam(const Engine& engine, const Beam& beam, std::span<const int> 
     for (std::size_t f = 0; f < faces.size(); ++f)
       if (engine.scene().materials[faces[f].material].opening >= 0) openings.push_back(static_cast<int>(f));
     outlines_.emplace(engine.faces(), openings, beam.direction_to_source);
-    for (int axis = 0; axis < 3; ++axis) {
-      glm::vec3 unit(0);
-      unit[axis] = 1;
-      absolute_axes_[axis] = glm::abs(outlines_->along_beam(unit));
-    }
-    for (const int f : openings) {
-      passages_.push_back({outlines_->outline({faces[f].corner, faces[f].is_quad ? 4u : 3u}),
-                           engine.rays().opening_transmittance(f, beam.direction_to_source)});
-    }
-    over_.resize(is_enclosed.size());
+    for (const int f : openings)
+      transmittance_.push_back(engine.rays().opening_transmittance(f, beam.direction_to_source));
+    over_.resize(samples.surfaces.size());
   }
-  parallel_indices(surfaces.size(), 64, [&](std::size_t i) {
-    const auto surface = static_cast<std::size_t>(surfaces[i]);
+  parallel_indices(samples.surfaces.size(), 64, [&](std::size_t i) {
+    const auto surface = static_cast<std::size_t>(samples.surfaces[i]);
     const Face& face = faces[surface / 2];
     if ((glm::dot(face.normal, beam.direction_to_source) > 0) != (surface % 2 == 0)) return;
-    if (is_sun) outlines_->covering(outlines_->outline({face.corner, face.is_quad ? 4u : 3u}), over_[surface]);
-    may_light_[surface] = !is_sun || !is_enclosed[surface] || !over_[surface].empty();
+    if (is_sun) outlines_->covering(outlines_->outline(face.corners()), over_[i]);
+    may_light_[i] = !is_sun || !is_enclosed[surface] || !over_[i].empty();
   });
 }
 
@@ -65,17 +58,10 @@ bool SeenBeam::may_light(const BeamGroup& group) const {
                        [&](const LightShaft& shaft) { return shaft.may_meet(group.low, group.high); });
   if (!(*is_enclosed_)[static_cast<std::size_t>(group.surface)]) return true;
   const glm::vec3 middle = outlines_->along_beam(0.5f * (group.low + group.high)),
-                  half = absolute_axes_ * (0.5f * (group.high - group.low));
-  const std::vector<int>& passages = over_[static_cast<std::size_t>(group.surface)];
+                  half = outlines_->half_along_beam(0.5f * (group.high - group.low));
+  const std::vector<int>& passages = over_[place(group.surface)];
   return std::any_of(passages.begin(), passages.end(),
-                     [&](int k) { return may_cover(k, middle - half, middle + half); });
-}
-
-// Whether an opening may cover something of a box across the beam.
-bool SeenBeam::may_cover(int passage, glm::vec3 low, glm::vec3 high) const {
-  const BeamOutline& of = passages_[static_cast<std::size_t>(passage)].outline;
-  return of.low.x <= high.x + margin_ && of.high.x >= low.x - margin_ && of.low.y <= high.y + margin_ &&
-         of.high.y >= low.y - margin_ && of.farthest >= low.z - margin_;
+                     [&](int k) { return outlines_->may_cover(k, middle - half, middle + half); });
 }
 
 void SeenBeam::find_shares(int surface, std::span<const BeamPoint> points, std::span<float> shares,
@@ -123,10 +109,10 @@ void SeenBeam::find_shares_of_sun(int surface, std::span<const BeamPoint> points
     shares[i] = faces(points[i]) ? 1.f : 0.f;
     is_reached[i] = is_open;
   }
-  for (const int k : over_[static_cast<std::size_t>(surface)]) {
-    if (!may_cover(k, low, high)) continue;
+  for (const int k : over_[place(surface)]) {
+    if (!outlines_->may_cover(k, low, high)) continue;
     outlines_->mark_behind(k, {x.data(), count}, {y.data(), count}, {z.data(), count}, {is_behind.data(), count});
-    const float transmittance = passages_[static_cast<std::size_t>(k)].transmittance;
+    const float transmittance = transmittance_[static_cast<std::size_t>(k)];
     for (std::size_t i = 0; i < count; ++i) {
       shares[i] *= is_behind[i] ? transmittance : 1.f;
       is_reached[i] |= is_behind[i];

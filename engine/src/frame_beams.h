@@ -33,17 +33,17 @@ class ShadowRays {
 /// rays look only for what is opaque, and only from points that openings let light to.
 class SeenBeam {
  public:
-  /// surfaces: all that will be asked about, as face * 2 + side. is_enclosed: by surface, whether beams reach it
-  /// through openings alone.
-  SeenBeam(const Engine& engine, const Beam& beam, std::span<const int> surfaces, const std::vector<char>& is_enclosed);
+  /// Will be asked about surfaces of the samples alone. is_enclosed: by face * 2 + side, whether beams reach it through
+  /// openings alone.
+  SeenBeam(const Engine& engine, const Beam& beam, const ViewSamples& samples, const std::vector<char>& is_enclosed);
 
   /// Whether a surface faces the beam, and something of it may be lit.
-  bool may_light(int surface) const { return may_light_[static_cast<std::size_t>(surface)] != 0; }
+  bool may_light(int surface) const { return may_light_[place(surface)] != 0; }
   /// Whether points of a group may be lit.
   bool may_light(const BeamGroup& group) const;
 
   /// Share of the beam that arrives at points of one surface. Where `rays` are added it is so if they meet nothing, and
-  /// 0 else.
+  /// 0 else: shares must stay where they are until these are traced.
   void find_shares(int surface, std::span<const BeamPoint> points, std::span<float> shares, ShadowRays& rays) const;
   void trace(ShadowRays& rays) const;
 
@@ -55,22 +55,20 @@ class SeenBeam {
  private:
   void find_shares_of_sun(int surface, std::span<const BeamPoint> points, std::span<float> shares,
                           ShadowRays& rays) const;
-  bool may_cover(int passage, glm::vec3 low, glm::vec3 high) const;
   void find_shares_of_lobe(std::span<const BeamPoint> points, std::span<float> shares, ShadowRays& rays) const;
+
+  std::size_t place(int surface) const {
+    return static_cast<std::size_t>(samples_->place_of_surface[static_cast<std::size_t>(surface)]);
+  }
 
   const Engine* engine_;
   const Beam* beam_;
+  const ViewSamples* samples_;
   const std::vector<char>* is_enclosed_;
-  std::vector<char> may_light_;           // by surface
+  std::vector<char> may_light_;           // by place of a surface
   std::optional<BeamOutlines> outlines_;  // of openings before the sun
-  glm::mat3 absolute_axes_{0};            // how far along them a box reaches: sizes of their coordinates
-  float margin_;                          // of boxes, more than rounding [m]
-  struct Passage {
-    BeamOutline outline;
-    float transmittance;
-  };
-  std::vector<Passage> passages_;
-  std::vector<std::vector<int>> over_;  // by surface: passages that may cover it
+  std::vector<float> transmittance_;      // of each of them
+  std::vector<std::vector<int>> over_;    // by place of a surface: those that may cover it
 };
 
 }  // namespace transom

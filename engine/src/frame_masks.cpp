@@ -1,6 +1,7 @@
 // Beams of a picture by stencil volumes: shadows of the sun, and shafts of lobes less what stands in them.
 #include "frame_masks.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -87,7 +88,7 @@ void FrameRenderer::make_volumes() {
       list = &openings[entry->second];
     }
     const unsigned base = static_cast<unsigned>(vertices.size());
-    vertices.insert(vertices.end(), face.corner, face.corner + (face.is_quad ? 4 : 3));
+    vertices.insert(vertices.end(), face.corners().begin(), face.corners().end());
     list->push_back({base, base + 1, base + 2});
     if (face.is_quad) list->push_back({base, base + 2, base + 3});
   }
@@ -139,8 +140,7 @@ int FrameRenderer::render_mask(const Beam& beam, const View& view, const Masks& 
 int FrameRenderer::render_shafts(const Beam& lobe, const VolumeCamera& camera, const Masks& masks,
                                  std::vector<float>& share) {
   const VolumeRange range = masks.range();
-  share.assign(static_cast<std::size_t>(range.right - range.left) * static_cast<std::size_t>(range.bottom - range.top),
-               0.f);
+  share.assign(range.pixel_count(), 0.f);
   int passes = 0;
   const glm::dvec3 source(lobe.direction_to_source);
   std::vector<const LightShaft*> rest;

@@ -18,7 +18,7 @@ class FrameRenderer::Masks {
   Masks(const View& view, int edge_samples, VolumeRange range)
       : width_(view.width),
         samples_(edge_samples),
-        scale_(std::clamp(kLargestSide / std::max(view.width, view.height), 1, edge_samples)),
+        scale_(std::clamp(kLargestVolumePicture / std::max(view.width, view.height), 1, edge_samples)),
         range_(std::move(range)) {}
 
   int scale() const { return scale_; }
@@ -30,19 +30,19 @@ class FrameRenderer::Masks {
   bool holds(int x, int y) const {
     return x >= range_.left && x < range_.right && y >= range_.top && y < range_.bottom;
   }
-  /// Of a sample of a pixel in the range; -1: its centre.
+  /// Of a sample of a pixel in the range; BeamPoint::kCentre: its centre.
   std::size_t index(int pixel, int sample) const {
     const int i = sample < 0 ? samples_ / 2 : sample % samples_, j = sample < 0 ? samples_ / 2 : sample / samples_;
     const int column = (pixel % width_ - range_.left) * scale_ + (2 * i + 1) * scale_ / (2 * samples_),
               row = (pixel / width_ - range_.top) * scale_ + (2 * j + 1) * scale_ / (2 * samples_);
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>((range_.right - range_.left) * scale_) +
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(range_.width() * scale_) +
            static_cast<std::size_t>(column);
   }
   /// Whether shares differ in a pixel of the range or in the squares around it: light that ends between the outermost
   /// ones of the pixel and the next ones may end in the pixel.
   bool light_ends_at(int x, int y, std::span<const float> shares) const {
-    const int left = (x - range_.left) * scale_, top = (y - range_.top) * scale_,
-              width = (range_.right - range_.left) * scale_, height = (range_.bottom - range_.top) * scale_;
+    const int left = (x - range_.left) * scale_, top = (y - range_.top) * scale_, width = range_.width() * scale_,
+              height = range_.height() * scale_;
     const int first = std::max(left - 1, 0), last = std::min(left + scale_ + 1, width);
     const auto row = [&](int j) {
       return shares.subspan(
@@ -57,7 +57,6 @@ class FrameRenderer::Masks {
   }
 
  private:
-  static constexpr int kLargestSide = 4096;  // pixels
   int width_, samples_, scale_;
   VolumeRange range_;
 };

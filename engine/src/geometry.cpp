@@ -172,6 +172,12 @@ void SceneGeometry::validate() const {
   }
 }
 
+int main_direction(glm::vec3 n) {
+  const glm::vec3 a = glm::abs(n);
+  const int axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
+  return 2 * axis + (n[axis] < 0);
+}
+
 glm::vec3 Face::position(glm::vec2 st) const {
   if (!is_quad) return corner[0] + st.x * (corner[1] - corner[0]) + st.y * (corner[2] - corner[0]);
   return (1 - st.y) * ((1 - st.x) * corner[0] + st.x * corner[1]) + st.y * ((1 - st.x) * corner[3] + st.x * corner[2]);

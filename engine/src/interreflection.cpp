@@ -40,15 +40,6 @@ float size_of(glm::vec4 value) {
   return std::abs(value.x) + std::abs(value.y) + std::abs(value.z);
 }
 
-SparseRows transposed(const SparseRows& rows) {
-  std::vector<std::vector<Share>> columns(rows.row_count());
-  for (std::size_t i = 0; i < rows.row_count(); ++i)
-    for (const Share& share : rows.row(i)) columns[share.index].push_back({static_cast<int>(i), share.weight});
-  SparseRows result;
-  for (const std::vector<Share>& column : columns) result.append(column);
-  return result;
-}
-
 }  // namespace
 
 Interreflection::Interreflection(const SparseRows& form_factors, const SparseRows& through,

@@ -107,7 +107,7 @@ Node LightMesh::place_on_element(int element, glm::vec2 u) const {
 
 Node LightMesh::middle_of(int index) const {
   const Slot own = slot(index);
-  const glm::vec2 middle = grid(own.face).is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3);
+  const glm::vec2 middle = grid(own.face).middle();
   Node node = place_on_side(2 * own.face + own.side, cell_parameters(own.face, own.cell, middle));
   if (is_cluster(index)) node.normal = glm::vec3(0);
   return node;
@@ -120,7 +120,7 @@ Node LightMesh::middle_of_element(int element) const {
     return {own.middle, own.normal};
   }
   const Slot own = slot(index);
-  const glm::vec2 middle = grid(own.face).is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3);
+  const glm::vec2 middle = grid(own.face).middle();
   return place_on_side(2 * own.face + own.side, element_parameters(own.face, own.cell, part, middle));
 }
 

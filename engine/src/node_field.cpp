@@ -84,7 +84,6 @@ int NodeField::node_at(int surface, glm::vec2 st) {
     const glm::vec3 normal = mesh_.faces().faces[face].shading_normal(st);
     nodes_.push_back({mesh_.lifted_position(face, side, st), side == 0 ? normal : -normal});
     surface_of_node_.push_back(surface);
-    place_of_node_.push_back(place);
   }
   return entry->second;
 }
@@ -137,11 +136,17 @@ void NodeField::expose(const std::vector<char>& is_exposed, int first_part) {
   });
 }
 
+// Its corners, and the one in the middle if there is one; returns how many.
+std::size_t NodeField::nodes_of(const Part& part, std::array<int, 5>& nodes) const {
+  std::size_t count = is_quad(part) ? 4 : 3;
+  std::copy_n(part.corner_node.begin(), count, nodes.begin());
+  if (part.middle_node >= 0) nodes[count++] = part.middle_node;
+  return count;
+}
+
 bool NodeField::is_parted(const Part& part) const {
-  int nodes[5];
-  std::size_t node_count = is_quad(part) ? 4 : 3;
-  std::copy_n(part.corner_node.begin(), node_count, nodes);
-  if (part.middle_node >= 0) nodes[node_count++] = part.middle_node;
+  std::array<int, 5> nodes;
+  const std::size_t node_count = nodes_of(part, nodes);
   Ray rays[10];
   std::uint8_t blocked[10];
   std::size_t count = 0;

@@ -1,9 +1,10 @@
 // Which nodes are beside each other.
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <numeric>
-#include <unordered_map>
+#include <utility>
 
+#include "transom/box_tree.h"
 #include "transom/node_field.h"
 #include "transom/parallel.h"
 
@@ -13,44 +14,16 @@ namespace {
 constexpr std::size_t kOnOtherSurfaces = 6;  // neighbours of a node at most, one on each
 constexpr float kBehind = 0.1f;              // sine of an angle up to which a node is not behind the other's surface
 
+// Boxes of two nodes meet wherever these are no farther apart than the larger reach.
+Box around(const Node& node, float reach) {
+  return {node.position - reach, node.position + reach};
+}
+
 }  // namespace
-
-/// Nodes by cubes of space.
-class NodeBuckets {
- public:
-  NodeBuckets(const std::vector<Node>& nodes, const std::vector<float>& reach)
-      : size_(std::max(1e-6f, *std::max_element(reach.begin(), reach.end()))) {
-    for (std::size_t i = 0; i < nodes.size(); ++i)
-      if (reach[i] > 0) nodes_[key(cube(nodes[i].position))].push_back(static_cast<int>(i));
-  }
-
-  /// Calls visit(node) for all nodes that may be no farther from a place than the longest reach.
-  template <typename Visit>
-  void visit_around(glm::vec3 place, const Visit& visit) const {
-    const glm::ivec3 middle = cube(place);
-    for (int z = -1; z <= 1; ++z)
-      for (int y = -1; y <= 1; ++y)
-        for (int x = -1; x <= 1; ++x) {
-          const auto bucket = nodes_.find(key(middle + glm::ivec3(x, y, z)));
-          if (bucket == nodes_.end()) continue;
-          for (const int node : bucket->second) visit(node);
-        }
-  }
-
- private:
-  glm::ivec3 cube(glm::vec3 place) const { return glm::ivec3(glm::floor(place / size_)); }
-  static std::uint64_t key(glm::ivec3 cube) {
-    constexpr std::uint64_t kMask = (1u << 21) - 1;
-    return (static_cast<std::uint64_t>(cube.x) & kMask) << 42 | (static_cast<std::uint64_t>(cube.y) & kMask) << 21 |
-           (static_cast<std::uint64_t>(cube.z) & kMask);
-  }
-  float size_;
-  std::unordered_map<std::uint64_t, std::vector<int>> nodes_;
-};
 
 // Each in front of the other's surface, or about in it.
 std::vector<int> NodeField::nearest_on_other_surfaces(int index, const std::vector<float>& reach,
-                                                      const NodeBuckets& buckets) const {
+                                                      const BoxTree& tree) const {
   const auto i = static_cast<std::size_t>(index);
   const Node& node = nodes_[i];
   struct Found {
@@ -58,9 +31,9 @@ std::vector<int> NodeField::nearest_on_other_surfaces(int index, const std::vect
     int node, surface;
   };
   std::vector<Found> found;
-  buckets.visit_around(node.position, [&](int other_index) {
+  tree.visit(around(node, reach[i]), [&](int other_index) {
     const auto k = static_cast<std::size_t>(other_index);
-    if (surface_of_node_[k] == surface_of_node_[i]) return;
+    if (!(reach[k] > 0) || surface_of_node_[k] == surface_of_node_[i]) return;
     const glm::vec3 offset = nodes_[k].position - node.position;
     const float distance = glm::length(offset);
     if (distance > std::max(reach[i], reach[k]) || glm::dot(offset, node.normal) < -kBehind * distance ||
@@ -88,10 +61,8 @@ NodeNeighbours NodeField::neighbours() const {
   std::vector<float> reach(nodes_.size(), 0.f);  // 0: not exposed, or of divided parts alone
   for (const Part& part : parts_) {
     if (part.first_child >= 0) continue;
-    int nodes[5];
-    std::size_t node_count = is_quad(part) ? 4 : 3;
-    std::copy_n(part.corner_node.begin(), node_count, nodes);
-    if (part.middle_node >= 0) nodes[node_count++] = part.middle_node;
+    std::array<int, 5> nodes;
+    const std::size_t node_count = nodes_of(part, nodes);
     const glm::vec2 size = this->size(part);
     for (std::size_t a = 0; a < node_count; ++a) {
       if (!node_is_exposed_[nodes[a]]) continue;
@@ -103,10 +74,12 @@ NodeNeighbours NodeField::neighbours() const {
   NodeNeighbours neighbours;
   neighbours.begin.assign(nodes_.size() + 1, 0);
   if (pairs.empty()) return neighbours;
-  const NodeBuckets buckets(nodes_, reach);
+  std::vector<Box> boxes;
+  for (std::size_t i = 0; i < nodes_.size(); ++i) boxes.push_back(around(nodes_[i], reach[i]));
+  const BoxTree tree(std::move(boxes));
   std::vector<std::vector<int>> across(nodes_.size());
   parallel_indices(nodes_.size(), 64, [&](std::size_t i) {
-    if (reach[i] > 0) across[i] = nearest_on_other_surfaces(static_cast<int>(i), reach, buckets);
+    if (reach[i] > 0) across[i] = nearest_on_other_surfaces(static_cast<int>(i), reach, tree);
   });
   for (std::size_t i = 0; i < across.size(); ++i)
     for (const int other : across[i]) {

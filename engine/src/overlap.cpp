@@ -18,15 +18,11 @@ constexpr double kLeastExtent2 = 1e-5;       // of the scene's extent squared: a
 constexpr std::uint32_t kRayCount = 16;
 constexpr std::uint32_t kSeed = 1;  // of a check: the same scene is always right or wrong
 
-int corner_count(const Face& face) {
-  return face.is_quad ? 4 : 3;
-}
-
 Box box_of(const Face& face, float margin) {
   Box box{face.corner[0], face.corner[0]};
-  for (int k = 1; k < corner_count(face); ++k) {
-    box.low = glm::min(box.low, glm::dvec3(face.corner[k]));
-    box.high = glm::max(box.high, glm::dvec3(face.corner[k]));
+  for (const glm::vec3& corner : face.corners()) {
+    box.low = glm::min(box.low, glm::dvec3(corner));
+    box.high = glm::max(box.high, glm::dvec3(corner));
   }
   return {box.low - static_cast<double>(margin), box.high + static_cast<double>(margin)};
 }
@@ -35,9 +31,9 @@ Box box_of(const Face& face, float margin) {
 // Hodgman 1974].
 double overlap_area(const Face& face, const Face& other, glm::dvec3& middle) {
   std::vector<glm::dvec3> polygon, clipped;
-  for (int k = 0; k < corner_count(face); ++k) polygon.emplace_back(face.corner[k]);
+  for (const glm::vec3& corner : face.corners()) polygon.emplace_back(corner);
   const glm::dvec3 normal(other.normal);
-  const int count = corner_count(other);
+  const int count = static_cast<int>(other.corners().size());
   for (int k = 0; k < count && !polygon.empty(); ++k) {
     const glm::dvec3 a(other.corner[k]), inward = glm::cross(normal, glm::dvec3(other.corner[(k + 1) % count]) - a);
     clipped.clear();
@@ -65,8 +61,8 @@ bool lie_on_each_other(const Faces& faces, int a, int b, double& area, glm::dvec
   const Face &first = faces.faces[a], &second = faces.faces[b];
   if (std::abs(glm::dot(first.normal, second.normal)) < kParallelCosine) return false;
   const auto off_plane = [&](glm::vec3 p) { return std::abs(glm::dot(p - first.corner[0], first.normal)); };
-  if (std::max({off_plane(second.corner[0]), off_plane(second.corner[1]),
-                off_plane(second.corner[corner_count(second) - 1])}) > faces.ray_offset())
+  if (std::max({off_plane(second.corner[0]), off_plane(second.corner[1]), off_plane(second.corners().back())}) >
+      faces.ray_offset())
     return false;
   area = overlap_area(second, first, middle);
   return area > kLeastShare * std::min(first.area, second.area);
@@ -94,6 +90,13 @@ bool is_lit(const Faces& faces, const std::vector<char>& is_indoors, const RaySc
   return false;
 }
 
+// Of all faces, wide enough for those to meet that lie on each other.
+std::vector<Box> boxes_of(const Faces& faces) {
+  std::vector<Box> boxes;
+  for (const Face& face : faces.faces) boxes.push_back(box_of(face, 0.5f * faces.ray_offset()));
+  return boxes;
+}
+
 // Area and middle of what two faces in one plane share, where light meets it; 0: they do not lie on each other.
 double lit_overlap(const Faces& faces, const std::vector<char>& is_indoors, const RayScene& rays, int a, int b,
                    glm::dvec3& middle) {
@@ -109,8 +112,7 @@ double lit_overlap(const Faces& faces, const std::vector<char>& is_indoors, cons
 
 void set_back_contacts(Faces& all) {
   const std::size_t count = all.faces.size();
-  std::vector<Box> boxes(count);
-  for (std::size_t f = 0; f < count; ++f) boxes[f] = box_of(all.faces[f], 0.5f * all.ray_offset());
+  const std::vector<Box> boxes = boxes_of(all);
   const BoxTree tree(boxes);
   const auto is_solid = [&](const Face& face) {
     return all.component_is_solid[static_cast<std::size_t>(face.component)] != 0;
@@ -122,26 +124,23 @@ void set_back_contacts(Faces& all) {
         if (face.corner[k][axis] != other.corner[k][axis]) return face.corner[k][axis] < other.corner[k][axis];
     return false;
   };
-  std::vector<char> is_set_back(count, 0);
   parallel_indices(count, 64, [&](std::size_t f) {
-    const Face& face = all.faces[f];
+    Face& face = all.faces[f];
+    face.is_set_back = false;
     if (!is_solid(face)) return;
     tree.visit(boxes[f], [&](int other) {
       double area = 0;
       glm::dvec3 middle(0);
-      if (!is_set_back[f] && all.faces[other].component != face.component && gives_way(face, all.faces[other]) &&
+      if (!face.is_set_back && all.faces[other].component != face.component && gives_way(face, all.faces[other]) &&
           lie_on_each_other(all, static_cast<int>(f), other, area, middle))
-        is_set_back[f] = 1;
+        face.is_set_back = true;
     });
   });
-  for (std::size_t f = 0; f < count; ++f) all.faces[f].is_set_back = is_set_back[f] != 0;
 }
 
 void check_overlaps(const Faces& faces, const std::vector<char>& is_indoors, const RayScene& rays) {
-  const float margin = faces.ray_offset();
   const std::size_t count = faces.faces.size();
-  std::vector<Box> boxes(count);
-  for (std::size_t f = 0; f < count; ++f) boxes[f] = box_of(faces.faces[f], 0.5f * margin);
+  const std::vector<Box> boxes = boxes_of(faces);
   const BoxTree tree(boxes);
   std::vector<int> partner(count, -1);  // the first face that each lies on
   parallel_indices(count, 64, [&](std::size_t b) {
@@ -163,7 +162,7 @@ void check_overlaps(const Faces& faces, const std::vector<char>& is_indoors, con
     text << "face " << high << ", lies in the plane of face " << low << ", and on " << area << " m² of it, near ("
          << middle.x << ", " << middle.y << ", " << middle.z
          << ") m: which of the two light meets would be chance. Delete one of them, cut a hole, or move it off by "
-         << 2 * margin << " m";
+         << 2 * faces.ray_offset() << " m";
     throw InputError(text.str());
   }
 }

@@ -12,12 +12,6 @@ constexpr int kLargestGroup = 64;  // patches
 
 }  // namespace
 
-int main_direction(glm::vec3 n) {
-  const glm::vec3 a = glm::abs(n);
-  const int axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
-  return 2 * axis + (n[axis] < 0);
-}
-
 PatchGroups::PatchGroups(const std::vector<PatchPlace>& places, const std::vector<float>& areas)
     : order_(places.size()), parent_of_patch_(places.size(), -1) {
   std::iota(order_.begin(), order_.end(), 0);

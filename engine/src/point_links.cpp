@@ -9,7 +9,6 @@
 namespace transom {
 namespace {
 
-constexpr float kFar = 4;  // diameters from which a patch counts as a point: then it errs by about 1 % of its share
 constexpr std::size_t kMemory = 512u << 20;  // for links [bytes]
 
 // What people build is aligned, and so are the places on it: many segments run along a face, or through its very edge,
@@ -198,7 +197,7 @@ PointLinks::MiddleView PointLinks::middle_view(int slot, Exposed exposed, const 
     for (std::size_t k = 0; k < kBlock && begin + k < point_count_; ++k) {
       const int point = static_cast<int>(begin + k);
       if (height[k] > 0 && cosine[k] > -size && gets_light(point))
-        (distance2[k] > kFar * kFar * size2 ? far_points : view.near_point).push_back(point);
+        (distance2[k] > kFarPatch * kFarPatch * size2 ? far_points : view.near_point).push_back(point);
     }
   }
   see_middle(view, far_points, KnownPoints(known, view.before.get()));
@@ -331,12 +330,11 @@ std::vector<std::shared_ptr<const PointLinks::Link>> PointLinks::links_of(const 
 std::vector<std::shared_ptr<const PointLinks::Link>> PointLinks::found_links(const std::vector<int>& slots,
                                                                              const Known& known) const {
   std::vector<std::shared_ptr<const Link>> links(slots.size());
-  std::vector<Exposed> exposed(slots.size());
-  parallel_indices(slots.size(), 1, [&](std::size_t k) {
-    exposed[k] = exposed_part(slots[k]);
-    const std::shared_ptr<const Link> before = known_link(slots[k], exposed[k], known);
-    if (before && known.has_same_points && (known.has_same_glazing || before->glazed_point.empty())) links[k] = before;
-  });
+  if (known.links && known.has_same_points)
+    parallel_indices(slots.size(), 1, [&](std::size_t k) {
+      const std::shared_ptr<const Link> before = known_link(slots[k], exposed_part(slots[k]), known);
+      if (before && (known.has_same_glazing || before->glazed_point.empty())) links[k] = before;
+    });
   std::vector<int> seen_slots;
   for (std::size_t k = 0; k < slots.size(); ++k) {
     if (links[k]) continue;

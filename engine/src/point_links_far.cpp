@@ -206,7 +206,7 @@ void PointLinks::link_far(Link& link, const MiddleView& view, const std::vector<
       link.seen.resize(link.seen.size() + kBlock, 0);
       link.asked.push_back(0);
     }
-    link.seen[link.seen.size() - kBlock + i % kBlock] = seen == kNotFar ? 0 : seen;
+    link.seen[link.seen.size() - kBlock + i % kBlock] = seen;
     if (is_asked[i]) link.asked.back() |= std::uint64_t{1} << i % kBlock;
   }
   weigh_far(link, view.slot);

@@ -1,7 +1,6 @@
 // The first reflection of beams towards linked points.
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <numbers>
 
 #include "transom/parallel.h"

@@ -66,9 +66,9 @@ SceneChange::SceneChange(const LightMesh& before, const LightMesh& after)
       if (counterpart[f] >= 0) continue;
       const Face& face = faces.faces[f];
       Box box{face.corner[0], face.corner[0]};
-      for (int k = 1; k < (face.is_quad ? 4 : 3); ++k) {
-        box.low = glm::min(box.low, face.corner[k]);
-        box.high = glm::max(box.high, face.corner[k]);
+      for (const glm::vec3& corner : face.corners()) {
+        box.low = glm::min(box.low, corner);
+        box.high = glm::max(box.high, corner);
       }
       boxes.push_back({box.low - margin, box.high + margin});
     }

@@ -184,21 +184,12 @@ bool ShadedPoints::may_be_shaded_by(const glm::vec3& a, const glm::vec3& b, cons
   return false;
 }
 
-VolumeTriangles ShadowCasters::volume(glm::dvec3 direction_to_sun, std::uint32_t infinity_index) const {
-  return volume_of(direction_to_sun, infinity_index, [](const glm::uvec3&) { return true; });
-}
-
 // Each triangle's own volume is closed: those of the others are right without it.
 VolumeTriangles ShadowCasters::volume(glm::dvec3 direction_to_sun, std::uint32_t infinity_index,
                                       std::span<const glm::vec3> vertices, const ShadedPoints& points) const {
-  return volume_of(direction_to_sun, infinity_index, [&](const glm::uvec3& corner) {
+  const auto casts = [&](const glm::uvec3& corner) {
     return points.may_be_shaded_by(vertices[corner.x], vertices[corner.y], vertices[corner.z]);
-  });
-}
-
-template <typename Casts>
-VolumeTriangles ShadowCasters::volume_of(glm::dvec3 direction_to_sun, std::uint32_t infinity_index,
-                                         const Casts& casts) const {
+  };
   VolumeTriangles volume;
   std::vector<int> multiplicity(edges_.size(), 0);  // in the direction from -> to
   std::vector<std::uint32_t> fronts;

@@ -62,8 +62,7 @@ class ShadowCasters {
   /// The near caps and the silhouette sides of the volume away from the unit vector `direction_to_sun`. A side is a
   /// triangle, its third vertex `infinity_index` the point at infinity: parallel light needs no far cap, since it would
   /// be that one point [Everitt & Kilgard 2002].
-  VolumeTriangles volume(glm::dvec3 direction_to_sun, std::uint32_t infinity_index) const;
-  /// The same of the triangles whose shade may fall on some points. vertices: those that the casters were made of.
+  /// Of the triangles whose shade may fall on some points. vertices: those that the casters were made of.
   VolumeTriangles volume(glm::dvec3 direction_to_sun, std::uint32_t infinity_index, std::span<const glm::vec3> vertices,
                          const ShadedPoints& points) const;
 
@@ -83,8 +82,6 @@ class ShadowCasters {
 
   void connect_edges();
   void find_solids(std::span<const glm::vec3> vertices);
-  template <typename Casts>
-  VolumeTriangles volume_of(glm::dvec3 direction_to_sun, std::uint32_t infinity_index, const Casts& casts) const;
   static int facing(const Triangle& triangle, glm::dvec3 direction_to_sun);
 
   std::vector<Triangle> triangles_;

@@ -5,7 +5,6 @@
 #include <glad/gl.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <glm/gtc/type_ptr.hpp>
 #include <limits>
@@ -23,8 +22,6 @@ namespace transom {
 
 namespace {
 
-constexpr int kLargestSide = 4096;  // pixels
-
 /// Volumes are drawn a little farther away than the surfaces, so that a surface stays in front of the sides of its own
 /// volume when the sun grazes it: a share of the depth's slope (corners snap to 1/256 pixel) and steps of the depth
 /// buffer. More would move shadow edges where a side is seen nearly edge-on, since its slope is steep.
@@ -36,9 +33,10 @@ bool is_finite(glm::dvec3 v) {
 }
 
 void check_camera(const VolumeCamera& camera) {
-  if (camera.width < 1 || camera.height < 1 || camera.width > kLargestSide || camera.height > kLargestSide) {
+  if (camera.width < 1 || camera.height < 1 || camera.width > kLargestVolumePicture ||
+      camera.height > kLargestVolumePicture) {
     throw InputError("Shadow volumes: a picture of " + std::to_string(camera.width) + " x " +
-                     std::to_string(camera.height) + " pixels is outside 1.." + std::to_string(kLargestSide));
+                     std::to_string(camera.height) + " pixels is outside 1.." + std::to_string(kLargestVolumePicture));
   }
   if (!(camera.vertical_fov_rad > 0 && camera.vertical_fov_rad < std::numbers::pi)) {
     throw InputError("Shadow volumes: a vertical field of view of " + std::to_string(camera.vertical_fov_rad) +
@@ -57,7 +55,7 @@ void check_range(const VolumeRange& range, const VolumeCamera& camera) {
 }
 
 std::size_t pixel_count(const VolumeRange& range) {
-  return static_cast<std::size_t>(range.right - range.left) * static_cast<std::size_t>(range.bottom - range.top);
+  return range.pixel_count();
 }
 
 }  // namespace
@@ -292,12 +290,11 @@ std::vector<std::uint8_t> ShadowVolumes::Impl::count_crossings(const VolumeTrian
 }
 
 std::vector<std::uint8_t> ShadowVolumes::Impl::read_stencil(const VolumeRange& range) const {
-  const auto width = static_cast<std::size_t>(range.right - range.left),
-             height = static_cast<std::size_t>(range.bottom - range.top);
+  const auto width = static_cast<std::size_t>(range.width()), height = static_cast<std::size_t>(range.height());
   std::vector<std::uint8_t> stencil(width * height);
   gl_.PixelStorei(GL_PACK_ALIGNMENT, 1);
-  gl_.ReadPixels(range.left, camera_.height - range.bottom, range.right - range.left, range.bottom - range.top,
-                 GL_STENCIL_INDEX, GL_UNSIGNED_BYTE, stencil.data());
+  gl_.ReadPixels(range.left, camera_.height - range.bottom, range.width(), range.height(), GL_STENCIL_INDEX,
+                 GL_UNSIGNED_BYTE, stencil.data());
   for (std::size_t y = 0; y < height / 2; ++y) {  // OpenGL's first row is the bottom one
     const auto row = [&](std::size_t i) { return stencil.begin() + static_cast<std::ptrdiff_t>(i * width); };
     std::swap_ranges(row(y), row(y + 1), row(height - 1 - y));
@@ -339,7 +336,7 @@ glm::dvec3 ShadowVolumes::Impl::begin(const VolumeCamera& camera, glm::dvec3 dir
     camera_ = camera;
   }
   gl_.Enable(GL_SCISSOR_TEST);
-  gl_.Scissor(range.left, camera.height - range.bottom, range.right - range.left, range.bottom - range.top);
+  gl_.Scissor(range.left, camera.height - range.bottom, range.width(), range.height());
   return glm::normalize(direction_to_sun);
 }
 
@@ -379,7 +376,7 @@ BeamMask ShadowVolumes::Impl::render(const VolumeCamera& camera, glm::dvec3 dire
     const VolumeTriangles volume = casters.volume(sun, static_cast<std::uint32_t>(vertices_.size()), vertices_, points);
     return volume.empty() ? std::vector<std::uint8_t>(pixel_count(range), 0) : count_crossings(volume, range);
   };
-  BeamMask mask{range.right - range.left, range.bottom - range.top, count(*opaque_casters_), {}};
+  BeamMask mask{range.width(), range.height(), count(*opaque_casters_), {}};
   for (std::uint8_t& pixel : mask.shadowed) pixel = pixel != 0;
   for (const Opening& opening : openings_) {
     mask.crossings.push_back(light_reaches_picture(opening.corners, sun)

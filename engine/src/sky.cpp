@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <string>
 
 #include "transom/error.h"
@@ -19,10 +18,6 @@ float azimuth_of(glm::vec3 direction) {
 }
 
 }  // namespace
-
-int SkyBins::sky_count() const {
-  return std::accumulate(row_counts.begin(), row_counts.end(), 0);
-}
 
 SkyBinIndex::SkyBinIndex(const SkyBins& bins) : row_counts_(bins.row_counts) {
   if (bins.row_altitude_edges.size() != bins.row_counts.size() + 1 || bins.row_counts.empty())

@@ -1,7 +1,5 @@
 #include "transom/sun_visibility.h"
 
-#include <algorithm>
-
 #include "transom/parallel.h"
 #include "transom/sampling.h"
 
@@ -25,7 +23,7 @@ Places places_facing(const Engine& engine, glm::vec3 direction) {
     const SobolSequence sequence(hash_seed(kPlaceStream, p));
     for (std::uint32_t i = 0; i < kPlacesPerPatch; ++i) {
       places.points.push_back(mesh.place_on(slot, sequence.point2(i)).position);
-      places.weights.push_back(engine.patch_areas()[p] * cosine / static_cast<float>(kPlacesPerPatch));
+      places.weights.push_back(mesh.slot_area(slot) * cosine / static_cast<float>(kPlacesPerPatch));
     }
   }
   return places;

@@ -42,7 +42,7 @@ double area_of(const Polygon& polygon) {
 
 Polygon corners_of(const Face& face) {
   Polygon polygon;
-  for (int k = 0; k < (face.is_quad ? 4 : 3); ++k) polygon.push_back(glm::dvec3(face.corner[k]));
+  for (const glm::vec3& corner : face.corners()) polygon.push_back(glm::dvec3(corner));
   return polygon;
 }
 

@@ -24,20 +24,6 @@ constexpr double kFarRowSum = 1e-3;
 
 constexpr std::size_t kRowsAtOnce = 64;
 
-SparseRows transpose(const SparseRows& rows) {
-  SparseRows result;
-  const std::size_t n = rows.row_count();
-  std::vector<std::size_t> count(n + 1, 0);
-  for (const Share& s : rows.entries) ++count[s.index + 1];
-  for (std::size_t i = 0; i < n; ++i) count[i + 1] += count[i];
-  result.begin = count;
-  result.entries.resize(rows.entries.size());
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t k = rows.begin[i]; k < rows.begin[i + 1]; ++k)
-      result.entries[count[rows.entries[k].index]++] = {static_cast<int>(i), rows.entries[k].weight};
-  return result;
-}
-
 // Row i of the mean of both estimates; their difference and sum are added up for the defect.
 void average_row(std::size_t i, const SparseRows& exchange, const SparseRows& reverse, const std::vector<float>& areas,
                  std::vector<Share>& row, double& difference, double& sum) {
@@ -65,7 +51,7 @@ void average_row(std::size_t i, const SparseRows& exchange, const SparseRows& re
 // One A_i F_ij for every pair that either patch has seen. With equal numbers of rays a patch, the variance of its
 // estimate is in proportion to its area: the smaller patch, whose rays are denser, has the larger say.
 SparseRows average_both_ways(const SparseRows& exchange, const std::vector<float>& areas, double& defect) {
-  const SparseRows reverse = transpose(exchange);
+  const SparseRows reverse = transposed(exchange);
   const std::size_t n = exchange.row_count(), chunk_count = (n + kRowsAtOnce - 1) / kRowsAtOnce;
   struct Chunk {
     std::vector<Share> entries;
@@ -162,6 +148,20 @@ double scale_both_ways(SparseRows& exchange, const std::vector<double>& scale, c
 }
 
 }  // namespace
+
+SparseRows transposed(const SparseRows& rows) {
+  SparseRows result;
+  const std::size_t n = rows.row_count();
+  std::vector<std::size_t> count(n + 1, 0);
+  for (const Share& s : rows.entries) ++count[s.index + 1];
+  for (std::size_t i = 0; i < n; ++i) count[i + 1] += count[i];
+  result.begin = count;
+  result.entries.resize(rows.entries.size());
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t k = rows.begin[i]; k < rows.begin[i + 1]; ++k)
+      result.entries[count[rows.entries[k].index]++] = {static_cast<int>(i), rows.entries[k].weight};
+  return result;
+}
 
 TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<float>& areas,
                                 const std::vector<float>& row_sums) {

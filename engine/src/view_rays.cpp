@@ -18,12 +18,12 @@ std::int64_t name_of(const Seen& seen) {
 }  // namespace
 
 // Whether a ray goes on beyond what it has met: an opening that can be looked through.
-bool CameraTracer::passes(std::size_t ray, Seen& here, std::vector<SeenPane>& panes) const {
+bool CameraTracer::passes(std::size_t ray, Seen& here, std::vector<SeenPane>* panes) const {
   if (here.hit.face < 0) return false;
   const Face& face = engine_.faces().faces[here.hit.face];
   const int opening = engine_.scene().materials[face.material].opening;
   if (opening < 0) return false;
-  if (engine_.reflectance(here.hit.face, here.hit.side) != glm::vec3(0)) panes.push_back({ray, here});
+  if (panes && engine_.reflectance(here.hit.face, here.hit.side) != glm::vec3(0)) panes->push_back({ray, here});
   if (const Panel* panel = engine_.panels().at(here.hit.face)) {  // nothing is seen through it
     here.panel_bin = here.hit.side == 1 ? engine_.panels().bin(*panel, -here.direction) : -1;
     here.ends_at_panel = true;
@@ -35,9 +35,9 @@ bool CameraTracer::passes(std::size_t ray, Seen& here, std::vector<SeenPane>& pa
 }
 
 void CameraTracer::trace(glm::vec2 corner, std::span<const glm::vec2> places, std::span<Seen> seen,
-                         std::vector<SeenPane>& panes) {
+                         std::vector<SeenPane>* panes) {
   const std::size_t count = places.size();
-  panes.clear();
+  if (panes) panes->clear();
   active_.clear();
   rays_.clear();
   for (std::vector<float>* list : {&x_, &y_, &z_}) list->resize(count);
@@ -55,13 +55,13 @@ void CameraTracer::trace(glm::vec2 corner, std::span<const glm::vec2> places, st
   for (int crossing = 1; crossing <= kMaximumCrossings && !active_.empty(); ++crossing) {
     hits_.resize(active_.size());
     engine_.rays().intersect(RayScene::What::kAll, rays_, hits_, RayScene::Order::kCoherent);
-    const std::vector<std::size_t> before = std::move(active_);
+    before_.swap(active_);
     active_.clear();
     rays_.clear();
-    for (std::size_t k = 0; k < before.size(); ++k) {
-      Seen& here = seen[before[k]];
+    for (std::size_t k = 0; k < before_.size(); ++k) {
+      Seen& here = seen[before_[k]];
       here.hit = hits_[k];
-      if (passes(before[k], here, panes)) go_on_from(before[k]);
+      if (passes(before_[k], here, panes)) go_on_from(before_[k]);
     }
   }
   for (const std::size_t i : active_) seen[i].through = 0;  // too many panes: dark

@@ -31,17 +31,18 @@ class CameraTracer {
   CameraTracer(const Engine& engine, const View& view)
       : engine_(engine), camera_(view), origin_(view.position - engine.faces().origin) {}
 
-  /// places: from the upper left corner of a pixel. seen: of the same size. panes: replaced; those that reflect.
-  void trace(glm::vec2 corner, std::span<const glm::vec2> places, std::span<Seen> seen, std::vector<SeenPane>& panes);
+  /// places: from the upper left corner of a pixel. seen: of the same size. panes: replaced; those that reflect. Null:
+  /// nobody asks for them.
+  void trace(glm::vec2 corner, std::span<const glm::vec2> places, std::span<Seen> seen, std::vector<SeenPane>* panes);
 
  private:
-  bool passes(std::size_t ray, Seen& here, std::vector<SeenPane>& panes) const;
+  bool passes(std::size_t ray, Seen& here, std::vector<SeenPane>* panes) const;
 
   const Engine& engine_;
   const CameraRays camera_;
   const glm::vec3 origin_;
   std::vector<float> x_, y_, z_;
-  std::vector<std::size_t> active_;
+  std::vector<std::size_t> active_, before_;
   std::vector<Ray> rays_;
   std::vector<Hit> hits_;
 };

@@ -113,7 +113,7 @@ CentreRays::CentreRays(const Engine& engine, const View& view)
   for (int x = 0; x < width_; ++x) middles.emplace_back(static_cast<float>(x) + 0.5f, 0.5f);
   parallel_indices(panes_.size(), 2, [&](std::size_t y) {
     CameraTracer tracer(engine, view);
-    tracer.trace({0, y}, middles, {&seen_[y * row_size], row_size}, panes_[y]);
+    tracer.trace({0, y}, middles, {&seen_[y * row_size], row_size}, &panes_[y]);
     std::stable_sort(panes_[y].begin(), panes_[y].end(),
                      [](const SeenPane& a, const SeenPane& b) { return a.ray < b.ray; });
   });
@@ -150,21 +150,6 @@ bool CentreRays::is_beside_edge(int x, int y) const {
   return (*above & kDown) || (x > 0 && (above[-1] & kDownRight)) || (x + 1 < width_ && (above[1] & kDownLeft));
 }
 
-// Sums the weights of shares of the same node.
-void merge_few(std::vector<Share>& shares) {
-  std::size_t kept = 0;
-  for (std::size_t k = 0; k < shares.size(); ++k) {
-    const Share share = shares[k];
-    std::size_t same = 0;
-    while (same < kept && shares[same].index != share.index) ++same;
-    if (same < kept)
-      shares[same].weight += share.weight;
-    else
-      shares[kept++] = share;
-  }
-  shares.resize(kept);
-}
-
 // The samples of the pixels of a row, one pixel after the other.
 class RowSampler {
  public:
@@ -195,14 +180,14 @@ class RowSampler {
   int s_;
   const std::vector<glm::vec2> places_, finer_places_;
   std::vector<Seen> found_, finer_;
-  std::vector<SeenPane> panes_, finer_panes_;
+  std::vector<SeenPane> panes_;
   PixelParts parts_;
   std::vector<Share> shares_;  // of the pixel
 };
 
 // Whether the pixel itself, at its samples, sees another surface than its middle.
 bool RowSampler::finds_edge(const Seen& middle, const CentreRays& middles, glm::vec2 corner) {
-  tracer_.trace(corner, places_, found_, panes_);
+  tracer_.trace(corner, places_, found_, &panes_);
   return std::any_of(found_.begin(), found_.end(), [&](const Seen& other) { return middles.differ(middle, other); });
 }
 
@@ -218,7 +203,7 @@ BeamPoint RowSampler::whole(const Seen& seen, glm::vec2 corner, int pixel, ViewS
 }
 
 void RowSampler::add_parts(glm::vec2 corner, int pixel, ViewSamples::Row& row) {
-  tracer_.trace(corner, finer_places_, finer_, finer_panes_);
+  tracer_.trace(corner, finer_places_, finer_, nullptr);
   for (const PixelParts::Part& part : parts_.tell_apart(found_, finer_)) {
     const float share = static_cast<float>(part.places.size()) / static_cast<float>(finer_.size()),
                 weight = share / static_cast<float>(part.samples.size());
@@ -261,7 +246,7 @@ void RowSampler::sample(const CentreRays& middles, std::size_t y, std::span<char
       for (auto other = first_pane; other != pane; ++other)
         row.on_panes.push_back(add_sample(engine_, other->seen, 1, pixel, BeamPoint::kCentre, shares_, row));
     }
-    merge_few(shares_);
+    merge_shares(shares_);
     row.smooth.append(shares_);
   }
   add_groups(centre, y * width, row.centre_groups);
@@ -316,10 +301,14 @@ ViewSamples::ViewSamples(const Engine& engine, const View& camera, int samples_p
     RowSampler(engine, view, edge_samples)
         .sample(middles, y, {&has_edge[y * row_size], row_size}, {&centre[y * row_size], row_size}, rows[y]);
   });
-  std::vector<char> is_listed(2 * engine.faces().faces.size(), 0);
+  place_of_surface.assign(2 * engine.faces().faces.size(), -1);
   const auto list_surfaces = [&](const auto& groups) {
-    for (const BeamGroup& group : groups)
-      if (!std::exchange(is_listed[static_cast<std::size_t>(group.surface)], 1)) surfaces.push_back(group.surface);
+    for (const BeamGroup& group : groups) {
+      int& place = place_of_surface[static_cast<std::size_t>(group.surface)];
+      if (place >= 0) continue;
+      place = static_cast<int>(surfaces.size());
+      surfaces.push_back(group.surface);
+    }
   };
   for (const Row& row : rows) {
     list_surfaces(row.centre_groups);

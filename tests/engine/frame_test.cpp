@@ -96,37 +96,13 @@ TEST(Frame, BeamsArriveWhereRaysFromEveryPixelSay) {
       if (glm::dot(normal, view.position - hits.position[p]) < 0) normal = -normal;
       const glm::vec3 lifted(hits.position[p] - engine.faces().origin +
                              static_cast<double>(engine.faces().ray_offset()) * normal);
-      const float expected =
-          engine.direct_light().illuminance(light->condition.beams, lifted, glm::vec3(normal)).y * 0.5f / 3.14159265f;
+      const float expected = engine.direct_light().illuminance(light->condition.beams, lifted, glm::vec3(normal)).y *
+                             0.5f / std::numbers::pi_v<float>;
       lit += expected > 0;
       different += std::abs(frame.sun[p].y - expected) > 1e-3f * expected;
     }
     EXPECT_GT(lit, 100);
     EXPECT_LE(different, 2);  // at the very edge of shade or light
-  }
-}
-
-TEST(RayScene, RaysFromOnePointMeetWhatTheyMeetOneByOne) {
-  const Engine engine(roof_light_room(0.5f), tregenza(), few_rays());
-  const glm::vec3 origin = glm::vec3(glm::dvec3(1, 1, 1.5) - engine.faces().origin);
-  std::vector<Ray> rays;
-  std::vector<float> x, y, z;
-  for (int i = 0; i < 37; ++i) {  // not a multiple of a packet
-    const float turn = 0.17f * static_cast<float>(i);
-    rays.push_back(
-        {origin, glm::normalize(glm::vec3(std::cos(turn), std::sin(turn), 0.1f * static_cast<float>(i - 18)))});
-    x.push_back(rays.back().direction.x);
-    y.push_back(rays.back().direction.y);
-    z.push_back(rays.back().direction.z);
-  }
-  std::vector<Hit> together(rays.size()), one_by_one(rays.size());
-  engine.rays().intersect_from(origin, x.data(), y.data(), z.data(), RayScene::What::kAll, together);
-  engine.rays().intersect(RayScene::What::kAll, rays, one_by_one);
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    EXPECT_EQ(together[i].face, one_by_one[i].face);
-    EXPECT_EQ(together[i].side, one_by_one[i].side);
-    EXPECT_FLOAT_EQ(together[i].t, one_by_one[i].t);
-    EXPECT_LT(glm::distance(together[i].st, one_by_one[i].st), 1e-5f);
   }
 }
 
@@ -193,42 +169,6 @@ TEST(Frame, VolumesFindLightBetweenSquaresOfTheStencilWhereverItLies) {
       EXPECT_NEAR(sum_of_sun(frame) * view.width / lit, kWidth, 1.0 / 16 + 1e-3) << place << ' ' << up.x;
     }
   }
-}
-
-TEST(Frame, SkyAndGroundDoNotBlendAtTheHorizonOfAPicture) {
-  const SkyBinIndex bins(tregenza());
-  for (const int height : {2, 5, 64}) {
-    Condition condition = uniform_sky(500, 100);
-    condition.picture_height = height;
-    condition.picture_width = 4 * height;
-    condition.picture.assign(4 * height * height, 1000.f);
-    for (const float z : {1e-4f, 0.01f, 0.3f}) {
-      EXPECT_FLOAT_EQ(condition.seen(glm::normalize(glm::vec3(1, 0.5f, z)), bins).y, 1000) << height << ' ' << z;
-      EXPECT_FLOAT_EQ(condition.seen(glm::normalize(glm::vec3(1, 0.5f, -z)), bins).y, 100) << height << ' ' << z;
-    }
-  }
-}
-
-TEST(Frame, APictureOfTheSkyIsSeenWhereItsTexelsAre) {
-  const SkyBinIndex bins(tregenza());
-  constexpr int kHeight = 16, kWidth = 64;
-  constexpr float kPi = std::numbers::pi_v<float>;
-  Condition condition = uniform_sky(500, 100);
-  condition.sky_colour = {0.5f, 1, 2};
-  condition.picture_height = kHeight;
-  condition.picture_width = kWidth;
-  for (int texel = 0; texel < kHeight * kWidth; ++texel) condition.picture.push_back(static_cast<float>(texel));
-  for (int row = 1; row < kHeight; ++row)
-    for (int column = 0; column < kWidth; ++column) {
-      const float theta = kPi / 2 * static_cast<float>(row) / (kHeight - 1) - 1e-6f,
-                  phi = 2 * kPi * (static_cast<float>(column) + 0.5f) / kWidth;
-      const glm::vec3 seen =
-          condition.seen({std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)}, bins);
-      const auto expected = static_cast<float>(row * kWidth + column);
-      EXPECT_NEAR(seen.y, expected, 0.01f);
-      EXPECT_FLOAT_EQ(seen.x, seen.y / 2);
-      EXPECT_FLOAT_EQ(seen.z, seen.y * 2);
-    }
 }
 
 TEST(Engine, SensorsAskedAgainUnderAnotherHourAreThoseOfAFreshEngine) {

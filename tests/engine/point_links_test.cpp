@@ -107,6 +107,21 @@ TEST(PointLinks, AnEvenlyLitPatchIsTheLimitOfAnAlmostEvenOne) {
       EXPECT_NEAR(b[i][channel], 1.002f * a[i][channel], 3e-3f * a[i][channel] + 1e-4f * most) << i;
 }
 
+TEST(PointLinks, ElementsOfOnePatchMayHaveTheirOwnHues) {
+  LitFloor floor;
+  for (std::size_t k = 0; k < floor.bright.size(); ++k)
+    floor.bright[k].radiosity *= k % 2 ? glm::vec3(1, 0.2f, 0) : glm::vec3(0, 0.5f, 1);
+  PointLinks links(*floor.mesh, *floor.rays, floor.points);
+  const FirstBounce connections(*floor.mesh, *floor.rays, floor.bright);
+  const std::vector<glm::vec3> linked = floor.by_links(links);
+  for (std::size_t i = 0; i < floor.points.size(); ++i) {
+    const glm::vec3 expected =
+        connections.irradiance(floor.points[i].position, floor.points[i].normal, FirstBounce::Rays::kOne);
+    for (int channel = 0; channel < 3; ++channel)
+      EXPECT_NEAR(linked[i][channel], expected[channel], 0.01f * (expected.x + expected.y + expected.z) + 1e-3f) << i;
+  }
+}
+
 TEST(PointLinks, ATableHidesTheFloorBelowIt) {
   LitFloor open, covered(true);
   open.points = covered.points = {{glm::vec3(2, 2, 1.01) - glm::vec3(open.faces.origin), {0, 0, -1}}};
@@ -147,7 +162,7 @@ struct ScreenedFloor : LitFloor {
 };
 
 TEST(PointLinks, APatchThatIsPartlyHiddenIsPartlySeen) {
-  // Lit evenly, lit in every third element alone, and in other colours: the part that is seen counts, not the share.
+  // Lit evenly, and lit in every third element alone: the part that is seen counts, not the share.
   for (const std::size_t step : {1, 3}) {
     ScreenedFloor all_or_nothing(false), parts(true);
     for (ScreenedFloor* floor : {&all_or_nothing, &parts}) {

@@ -1,6 +1,7 @@
-// What rays meet where faces meet each other.
+// What rays meet where faces meet each other, and rays from one point.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
 #include "rooms.h"
@@ -73,7 +74,7 @@ TEST(RayScene, WhatIsMetAtAnEdgeDoesNotHangOnOtherFaces) {
     for (std::size_t k = 0; k < rays.size(); ++k) {
       if (here[k].face >= static_cast<int>(bare.faces.faces.size())) continue;  // something else is in the way
       differ += !is_same(there[k], here[k]);
-      ++compared;
+      compared += there[k].face >= 0;
     }
     EXPECT_EQ(differ, 0) << "of " << compared;
     EXPECT_GT(compared, kRays / 2);
@@ -85,13 +86,15 @@ TEST(RayScene, WhatIsMetAtAnEdgeDoesNotHangOnOtherRays) {
   const std::vector<Ray> rays = rays_to_edges(traced);
   std::vector<Hit> together(rays.size());
   traced.rays.intersect(RayScene::What::kAll, rays, together, RayScene::Order::kCoherent);
-  int differ = 0;
+  int differ = 0, compared = 0;
   for (std::size_t k = 0; k < rays.size(); ++k) {
     Hit alone;
     traced.rays.intersect(RayScene::What::kAll, {&rays[k], 1}, {&alone, 1});
     differ += !is_same(together[k], alone);
+    compared += alone.face >= 0;
   }
   EXPECT_EQ(differ, 0);
+  EXPECT_GT(compared, kRays / 2);
 }
 
 // The floor goes on below the table, whose sides only begin there.
@@ -103,6 +106,7 @@ TEST(RayScene, AnEdgeThatStandsOnAFaceIsThatFace) {
     const Ray ray{from, glm::normalize(to - from)};
     Hit hit;
     traced.rays.intersect(RayScene::What::kAll, {&ray, 1}, {&hit, 1});
+    ASSERT_GE(hit.face, 0) << k;
     EXPECT_EQ(traced.faces.faces[static_cast<std::size_t>(hit.face)].source, 0);
   }
 }
@@ -137,6 +141,30 @@ TEST(RayScene, OfTwoSolidsThatTouchTheSmallerFaceIsSetBack) {
   const Faces faces = make_faces(scene);
   for (const Face& face : faces.faces)
     EXPECT_EQ(face.is_set_back, face.source == 10 || face.source == 16) << face.source;
+}
+
+TEST(RayScene, RaysFromOnePointMeetWhatTheyMeetOneByOne) {
+  const Traced traced(roof_light_room(0.5f));
+  const glm::vec3 origin = glm::vec3(glm::dvec3(1, 1, 1.5) - traced.faces.origin);
+  std::vector<Ray> rays;
+  std::vector<float> x, y, z;
+  for (int i = 0; i < 37; ++i) {  // not a multiple of a packet
+    const float turn = 0.17f * static_cast<float>(i);
+    rays.push_back(
+        {origin, glm::normalize(glm::vec3(std::cos(turn), std::sin(turn), 0.1f * static_cast<float>(i - 18)))});
+    x.push_back(rays.back().direction.x);
+    y.push_back(rays.back().direction.y);
+    z.push_back(rays.back().direction.z);
+  }
+  std::vector<Hit> together(rays.size()), one_by_one(rays.size());
+  traced.rays.intersect_from(origin, x.data(), y.data(), z.data(), RayScene::What::kAll, together);
+  traced.rays.intersect(RayScene::What::kAll, rays, one_by_one);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    EXPECT_EQ(together[i].face, one_by_one[i].face);
+    EXPECT_EQ(together[i].side, one_by_one[i].side);
+    EXPECT_FLOAT_EQ(together[i].t, one_by_one[i].t);
+    EXPECT_LT(glm::distance(together[i].st, one_by_one[i].st), 1e-5f);
+  }
 }
 
 }  // namespace

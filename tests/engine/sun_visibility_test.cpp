@@ -28,6 +28,17 @@ TEST(SunVisibility, WeightsOfPlacesAreTheFluxThatSurfacesWouldReceive) {
   ASSERT_EQ(places.points.size(), places.weights.size());
 }
 
+TEST(SunVisibility, APatchThatABoxStandsOnCountsByWhatIsLeftOfIt) {
+  SceneGeometry scene = roof_light_room(0.5f);
+  test::add_box(scene, {1.31, 1.27, 0}, {2.46, 2.55, 0.5}, 0);
+  const Engine engine(scene, tregenza(), test::quick(1500, {64, 16}, {64, 16}));
+  const glm::vec3 up(0, 0, 1);
+  const Places places = places_facing(engine, up);
+  const std::vector<float> shares = shares_from(engine, places.points, {&up, 1});
+  const double flux = std::inner_product(shares.begin(), shares.end(), places.weights.begin(), 0.0);
+  EXPECT_NEAR(flux, 4, 0.03 * 4);  // through the roof light, on the box or beside it
+}
+
 TEST(SunVisibility, SharesAreWhatOpeningsLeaveOfEachDirection) {
   const float transmittance = 0.6f;
   const Engine engine(roof_light_room(0.5f, transmittance), tregenza(), few_rays());

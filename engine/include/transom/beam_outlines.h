@@ -21,7 +21,7 @@ struct BeamOutline {
 /// Outlines of faces along one direction.
 class BeamOutlines {
  public:
-  /// faces: numbers of those that light may pass, such as openings.
+  /// passages: numbers of faces that light may pass, such as openings.
   BeamOutlines(const Faces& faces, const std::vector<int>& passages, glm::vec3 direction_to_source);
 
   BeamOutline outline(std::span<const glm::vec3> corners) const;
@@ -29,6 +29,9 @@ class BeamOutlines {
   /// The passages that cover some of a polygon and do not lie wholly behind it. Conservative: one that covers nothing
   /// may be named, none that covers something is left out.
   void covering(const BeamOutline& polygon, std::vector<int>& passages) const;
+
+  /// Whether passage k may cover some of a box as along_beam has it, in the same sense.
+  bool may_cover(int k, glm::vec3 low, glm::vec3 high) const;
 
   /// Whether passage k may cover some of a polygon, in the same sense.
   bool covers(int k, const BeamOutline& polygon) const;
@@ -54,6 +57,10 @@ class BeamOutlines {
     return {glm::dot(point, across_), glm::dot(point, along_), glm::dot(point, towards_)};
   }
   void along_beam(const Points& points, Points& seen) const;
+  /// Half the size of the box, as along_beam has it, around one whose half size is `half`.
+  glm::vec3 half_along_beam(glm::vec3 half) const {
+    return {glm::dot(half, glm::abs(across_)), glm::dot(half, glm::abs(along_)), glm::dot(half, glm::abs(towards_))};
+  }
 
   /// Which points (as along_beam has them: coordinates x, y and z, one after the other) lie behind passage k, a planar
   /// one: light that arrives there along the beam has come through it. Exactly; is_behind: 1 or 0 for each.

@@ -5,7 +5,6 @@
 #include <glm/glm.hpp>
 #include <memory>
 #include <span>
-#include <string>
 #include <unordered_map>
 #include <vector>
 
@@ -275,8 +274,9 @@ class Engine {
   // Where light is shown.
   std::unique_ptr<NodeField> nodes_;
   std::shared_ptr<const NodeRows> node_rows_;
-  SparseRows node_sky_, node_through_;  // all of the sky; patches seen through openings
-  CompactRows node_patches_;            // all that nodes see of patches
+  SparseRows node_sky_, node_through_;        // all of the sky; patches seen through openings
+  CompactRows node_patches_;                  // all that nodes see of patches
+  std::vector<NodeShares> nodes_at_element_;  // what speaks for each element of patches, at its middle
   SparseRows node_near_;  // what the nodes, then the patches, send close by: those with their weights, less these
   std::unique_ptr<PointLinks> links_;
 

@@ -10,6 +10,9 @@
 
 namespace transom {
 
+/// Diameters from which a patch counts as a point: then it errs by about 1 % of its share.
+inline constexpr float kFarPatch = 4;
+
 /// An element that sends out light of its own, or a beam's: radiosity [lm/m²].
 struct BrightElement {
   int element;  ///< counted over all slots

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "transom/light_mesh.h"
@@ -39,7 +38,8 @@ struct GatherRow {
   std::vector<Share> through;  ///< slots seen through openings: form factors x transmittance
   /// Sky bins, then the ground, then exit bins of panels (Panels): illuminance per luminance [lx per cd/m²].
   std::vector<Share> sky;
-  std::vector<Share> near;      ///< of a point: elements reached whose patch is near, as `reached` has them by slot
+  /// Of a point: elements reached, as `reached` has them by slot; of near patches, or of all where that was asked for.
+  std::vector<Share> near;
   float escaped = 0;            ///< share of the hemisphere that meets nothing: open sky
   float exposure = 1;           ///< share of the receiver that does not lie inside a solid
   float harmonic_distance = 0;  ///< harmonic mean distance of what is seen [m]

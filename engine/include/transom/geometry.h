@@ -1,9 +1,9 @@
 /// @file What the engine is given: faces, materials, openings, sources. Metres, z up; a face has two sides.
 #pragma once
 
-#include <cstdint>
 #include <glm/glm.hpp>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "transom/angle_bins.h"
@@ -67,12 +67,16 @@ struct Face {
   int source = 0;     ///< face of the scene that this is, or is a piece of
   int component = 0;  ///< faces joined at vertices; see Faces::component_is_solid
 
+  std::span<const glm::vec3> corners() const { return {corner, is_quad ? 4u : 3u}; }
   glm::vec3 position(glm::vec2 st) const;
   /// Shading normal of the front side: interpolated corner normals.
   glm::vec3 shading_normal(glm::vec2 st) const;
   /// Parameters of a point of the face, from the barycentric coordinates of its triangle 0 (a, b, c) or 1 (a, c, d).
   glm::vec2 parameters(int triangle, glm::vec2 barycentric) const;
 };
+
+/// 0 to 5: the axis, and its sense, that a normal is nearest to.
+int main_direction(glm::vec3 normal);
 
 /// All faces, and the frame they are in: engine = world - origin.
 struct Faces {

@@ -29,6 +29,9 @@ struct Grid {
 
   bool operator==(const Grid&) const = default;
 
+  /// Parameters of the middle of a cell, or of an element of it, within it.
+  glm::vec2 middle() const { return is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3); }
+
   int cell_count() const { return is_quad ? u_count * v_count : u_count * u_count; }
   int node_count() const { return is_quad ? (u_count + 1) * (v_count + 1) : (u_count + 1) * (u_count + 2) / 2; }
 

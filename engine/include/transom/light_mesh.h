@@ -36,6 +36,7 @@ class LightMesh {
   const Faces& faces() const { return *faces_; }
   const FaceClusters& clusters() const { return clusters_; }
   int slot_count() const { return first_cluster_slot() + clusters_.count(); }
+  int elements_per_edge() const { return elements_per_edge_; }
   int elements_per_slot() const { return elements_per_edge_ * elements_per_edge_; }
   const Grid& grid(int face) const { return grids_[static_cast<std::size_t>(face)]; }
 

@@ -30,7 +30,7 @@ struct NodeNeighbours {
   }
 };
 
-class NodeBuckets;
+class BoxTree;
 
 /// Nodes at the corners of cells, and of the parts into which cells are divided where light changes within them. Parts
 /// of one side of a face share the nodes that they have in common. Where something stands between the nodes of a part,
@@ -47,8 +47,6 @@ class NodeField {
   const std::vector<Node>& nodes() const { return nodes_; }
   /// The face that a node lies on, times two, plus the side.
   int surface(std::size_t node) const { return surface_of_node_[node]; }
-  /// Names the place of a node: another field has the same node where surface and place are equal.
-  std::uint64_t place(std::size_t node) const { return place_of_node_[node]; }
   bool is_exposed(std::size_t node) const { return node_is_exposed_[node]; }
 
   /// Says of the nodes that have been added since the last call whether they lie outside solids, and finds the parts
@@ -91,12 +89,12 @@ class NodeField {
     std::uint8_t division = 0;  // of u: bit 0; of v: bit 1
     char is_split = 0;
   };
-  std::vector<int> nearest_on_other_surfaces(int node, const std::vector<float>& reach,
-                                             const NodeBuckets& buckets) const;
+  std::vector<int> nearest_on_other_surfaces(int node, const std::vector<float>& reach, const BoxTree& tree) const;
   bool is_quad(const Part& part) const { return mesh_.grid(part.surface / 2).is_quad; }
   glm::vec2 size(const Part& part) const;
   void add_part(int surface, glm::vec2 corner, glm::vec2 u, glm::vec2 v);
   int node_at(int surface, glm::vec2 st);
+  std::size_t nodes_of(const Part& part, std::array<int, 5>& nodes) const;
   bool is_parted(const Part& part) const;
   NodeShares between_corners(const Part& part, glm::vec2 own) const;
   NodeShares between_middle_and_corners(const Part& part, glm::vec2 own) const;
@@ -108,7 +106,6 @@ class NodeField {
   std::vector<Part> parts_;        // children of one part stand together
   std::vector<Node> nodes_;
   std::vector<int> surface_of_node_;
-  std::vector<std::uint64_t> place_of_node_;
   std::vector<char> node_is_exposed_;
   std::vector<std::unordered_map<std::uint64_t, int>> node_of_place_;  // by surface
   float thin_;

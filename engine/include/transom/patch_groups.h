@@ -15,9 +15,6 @@ struct PatchPlace {
   int material = 0;
 };
 
-/// 0 to 5: the axis, and its sense, that a normal is nearest to.
-int main_direction(glm::vec3 normal);
-
 /// A tree of groups of patches of one material that face about the same way: each of two halves, down to single
 /// patches. A group stands for its patches by their mean over area. Rows of weights over patches become rows over
 /// patches and groups, as coarse as some typical light allows [after hierarchical radiosity, Hanrahan et al. 1991].

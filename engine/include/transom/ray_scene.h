@@ -33,7 +33,8 @@ class RayScene {
  public:
   enum class What { kOpaque, kOpenings, kAll };
 
-  /// Whether each sixteen rays in a row go about the same way. Says how to trace them, never what they meet.
+  /// Whether each sixteen rays in a row go about the same way. Says how to trace them, not what they meet, but for
+  /// `occluded`: a ray along the very edge of a face is stopped by it or not as the rays beside it are.
   enum class Order { kScattered, kCoherent };
 
   RayScene(const Faces& faces, const std::vector<Material>& materials, const std::vector<OpeningGroup>& openings);

@@ -12,11 +12,14 @@
 
 namespace transom {
 
+/// Side of a picture at most [pixels].
+inline constexpr int kLargestVolumePicture = 4096;
+
 /// Pinhole camera. Pixel (0, 0) is at the top left; the pixel's centre, at +0.5, is what is sampled.
 struct VolumeCamera {
   glm::dvec3 position{0}, target{0}, up{0, 0, 1};
   double vertical_fov_rad = 1;
-  int width = 0, height = 0;  ///< up to 4096 each, and to what the OpenGL renderer allows
+  int width = 0, height = 0;  ///< up to kLargestVolumePicture each, and to what the OpenGL renderer allows
 
   bool operator==(const VolumeCamera&) const = default;
 };
@@ -25,6 +28,9 @@ struct VolumeCamera {
 struct VolumeRange {
   /// Pixels of the picture: from (left, top) on, below (right, bottom).
   int left = 0, top = 0, right = 0, bottom = 0;
+  int width() const { return right - left; }
+  int height() const { return bottom - top; }
+  std::size_t pixel_count() const { return static_cast<std::size_t>(width()) * static_cast<std::size_t>(height()); }
   /// Visible points in these pixels, in boxes: two corners each. Empty: any. Of others the answers may be anything.
   std::vector<std::pair<glm::vec3, glm::vec3>> boxes;
 };

@@ -14,10 +14,6 @@ namespace transom {
 struct SkyBins {
   std::vector<float> row_altitude_edges;  ///< rows + 1, radians, from 0 to pi / 2
   std::vector<int> row_counts;
-
-  int sky_count() const;
-  int ground() const { return sky_count(); }
-  int count() const { return sky_count() + 1; }
 };
 
 /// Finds the bin of a direction. Built once from SkyBins.

@@ -64,6 +64,9 @@ struct SparseRows {
   }
 };
 
+/// Columns as rows, of square rows; entries in the order of their rows.
+SparseRows transposed(const SparseRows& rows);
+
 /// How far sampled form factors were from what form factors must be, before and after mending.
 struct TransferDefects {
   double raw_reciprocity = 0;  ///< sum |A_i F_ij - A_j F_ji| / sum A_i F_ij, as sampled

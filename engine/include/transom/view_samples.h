@@ -96,9 +96,11 @@ struct ViewSamples {
   View view;
   int edge_samples;
   std::vector<char> has_edge;     ///< by pixel: an edge of a surface
-  std::vector<BeamPoint> centre;  ///< by pixel: the surface at its centre; where it has no edge, at `scattered_place`
+  std::vector<BeamPoint> centre;  ///< by pixel: the surface at its centre; where it has no edge, at `scattered_place`,
+                                  ///< unless there is one sample a pixel
   std::vector<Row> rows;
-  std::vector<int> surfaces;  ///< all that groups and parts lie on, each once
+  std::vector<int> surfaces;          ///< all that groups and parts lie on, each once
+  std::vector<int> place_of_surface;  ///< among them; -1: is not
 };
 
 }  // namespace transom

@@ -101,8 +101,8 @@ class SunPlan:
     """Sub-suns of a condition, and why so many.
 
     penumbra_share: of the sun's light on surfaces of rooms, what falls on places that see a part of the disc.
-    point_sun_error, sub_sun_error: of its illuminance at places, in the mean and relative to its mean, with a point and with these
-    sub-suns. All three are 0 where nobody asked, or no sun comes in.
+    point_sun_error, sub_sun_error: of its illuminance at places, in the mean and relative to its mean, with a point and
+    with these sub-suns. All three are 0 where nobody asked, or no sun comes in.
     """
 
     sub_suns: int = 1
