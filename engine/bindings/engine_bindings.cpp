@@ -204,22 +204,28 @@ NB_MODULE(_engine, m) {
       .def_ro("panel_count", &SolveFacts::panel_count)
       .def_ro("panel_bin_count", &SolveFacts::panel_bin_count);
 
+  nb::class_<SkyPicture>(m, "SkyPicture", "What is seen of a sky; rows from the zenith to the horizon.")
+      .def(
+          "__init__",
+          [](SkyPicture* self, In<float, nb::ndim<2>> luminance) {
+            new (self) SkyPicture{to_vector<float>(luminance), static_cast<int>(luminance.shape(1)),
+                                  static_cast<int>(luminance.shape(0))};
+          },
+          "luminance"_a);
+
   nb::class_<Condition>(m, "Condition")
       .def(
           "__init__",
           [](Condition* self, In<float, nb::ndim<1>> sky_luminance, std::tuple<float, float, float> sky_colour,
-             std::tuple<float, float, float> ground_luminance, In<float, nb::ndim<2>> sky_picture) {
+             std::tuple<float, float, float> ground_luminance) {
             new (self) Condition{};
             self->sky_luminance = to_vector<float>(sky_luminance);
             const auto [sr, sg, sb] = sky_colour;
             self->sky_colour = {sr, sg, sb};
             const auto [gr, gg, gb] = ground_luminance;
             self->ground_luminance = {gr, gg, gb};
-            self->picture = to_vector<float>(sky_picture);
-            self->picture_height = static_cast<int>(sky_picture.shape(0));
-            self->picture_width = static_cast<int>(sky_picture.shape(1));
           },
-          "sky_luminance"_a, "sky_colour"_a, "ground_luminance"_a, "sky_picture"_a)
+          "sky_luminance"_a, "sky_colour"_a, "ground_luminance"_a)
       .def(
           "add_beam",
           [](Condition& c, std::tuple<float, float, float> direction, std::tuple<float, float, float> illuminance) {
@@ -308,11 +314,12 @@ NB_MODULE(_engine, m) {
           nb::call_guard<nb::gil_scoped_release>(), "The same, once the newest condition is complete.")
       .def(
           "render",
-          [](Session& s, const View& view, Visibility visibility, int edge_samples, bool components) {
+          [](Session& s, const View& view, Visibility visibility, int edge_samples, bool components,
+             const SkyPicture& sky) {
             Frame frame;
             {
               const nb::gil_scoped_release release;
-              frame = s.renderer.render(view, *s.present, {visibility, edge_samples, components});
+              frame = s.renderer.render(view, *s.present, {visibility, edge_samples, components, &sky});
             }
             nb::dict result;
             const int w = frame.width, h = frame.height;
@@ -327,7 +334,7 @@ NB_MODULE(_engine, m) {
             result["exterior"] = picture(std::move(frame.exterior), w, h);
             return result;
           },
-          "view"_a, "visibility"_a, "edge_samples"_a, "components"_a)
+          "view"_a, "visibility"_a, "edge_samples"_a, "components"_a, "sky"_a)
       .def(
           "illuminance",
           [](Session& s, In<double, nb::shape<-1, 3>> points, In<float, nb::shape<-1, 3>> normals,

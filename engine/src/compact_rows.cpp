@@ -18,11 +18,27 @@ constexpr int kLargest = 14;                  // exponent of the largest value
 constexpr std::uint32_t kGoldenRatio = 5063;  // of 2^13: multiples of it are spread evenly
 
 // Rounds up or down, so that many equal values have their mean: `number` tells them apart.
-std::uint16_t half_of(float value, std::size_t number) {
+std::uint16_t half_of(float value, std::uint32_t number) {
   const auto bits = std::bit_cast<std::uint32_t>(value), size = bits & 0x7fffffffu;
-  const std::uint32_t threshold = static_cast<std::uint32_t>(number) * kGoldenRatio & ((1u << kShift) - 1);
-  if (size < kLeast) return 0;
-  return static_cast<std::uint16_t>((bits >> 16 & 0x8000u) | (size - kBias + threshold) >> kShift);
+  const std::uint32_t threshold = number * kGoldenRatio & ((1u << kShift) - 1);
+  const std::uint32_t half = (bits >> 16 & 0x8000u) | (size - kBias + threshold) >> kShift;
+  return static_cast<std::uint16_t>(size < kLeast ? 0u : half);
+}
+
+// Values, of which kChannels make a colour, times `scale` as halves. The loop is one for the compiler to take several
+// values at once; so is the next.
+template <std::uint32_t kChannels>
+void put_halves(const float* values, float scale, std::vector<std::uint16_t>& halves) {
+  const auto count = static_cast<std::uint32_t>(halves.size());
+  std::uint16_t* const to = halves.data();
+  for (std::uint32_t k = 0; k < count; ++k) to[k] = half_of(scale * values[k], k / kChannels);
+}
+
+// The largest size of values that are finite: sizes of floats are ordered as their bits are.
+float largest_size(const float* values, std::size_t count) {
+  std::uint32_t most = 0;
+  for (std::size_t k = 0; k < count; ++k) most = std::max(most, std::bit_cast<std::uint32_t>(values[k]) & 0x7fffffffu);
+  return std::bit_cast<float>(most);
 }
 
 // A half, or four, as floats.
@@ -163,24 +179,15 @@ void HalfColours::choose_unit(float most) {
   if (most > 0) unit_ = std::ldexp(1.f, std::ilogb(most) - kLargest);
 }
 
-HalfColours::HalfColours(const std::vector<glm::vec4>& colours, bool is_grey) : is_grey_(is_grey) {
-  float most = 0;
-  for (const glm::vec4& colour : colours)
-    most = std::max({most, std::abs(colour.x), std::abs(colour.y), std::abs(colour.z)});
-  choose_unit(most);
-  const float scale = 1 / unit_;
-  const int channels = is_grey ? 1 : 4;
-  half_.resize(colours.size() * static_cast<std::size_t>(channels));
-  for (std::size_t i = 0, k = 0; i < colours.size(); ++i)
-    for (int channel = 0; channel < channels; ++channel, ++k) half_[k] = half_of(scale * colours[i][channel], i);
+HalfColours::HalfColours(const std::vector<glm::vec4>& colours) : half_(4 * colours.size()) {
+  const float* const values = reinterpret_cast<const float*>(colours.data());
+  choose_unit(largest_size(values, half_.size()));
+  put_halves<4>(values, 1 / unit_, half_);
 }
 
 HalfColours::HalfColours(const std::vector<float>& greys) : half_(greys.size()), is_grey_(true) {
-  float most = 0;
-  for (const float grey : greys) most = std::max(most, std::abs(grey));
-  choose_unit(most);
-  const float scale = 1 / unit_;
-  for (std::size_t i = 0; i < greys.size(); ++i) half_[i] = half_of(scale * greys[i], i);
+  choose_unit(largest_size(greys.data(), greys.size()));
+  put_halves<1>(greys.data(), 1 / unit_, half_);
 }
 
 CompactColumns::CompactColumns(const SparseRows& rows) : begin(rows.begin) {

@@ -1,6 +1,7 @@
 // The sun on elements: few samples everywhere it may reach, many at the edges of its light.
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 
 #include "deposit_samples.h"
@@ -15,6 +16,7 @@ constexpr int kTellingSamples = 2;             // of these, the ones that say wh
 constexpr int kRefinedSamplesPerElement = 32;  // at the edges of light
 constexpr float kSameShare = 1e-3f;            // of the sun, between samples of an evenly lit element
 constexpr std::size_t kGrain = 4;
+constexpr std::size_t kReceivers = 128;  // looked at together: they share what covers their face
 static_assert(kPatternPoints >= kRefinedSamplesPerElement);
 
 }  // namespace
@@ -46,12 +48,13 @@ class DirectLight::Sun {
   std::vector<float> transmittance;
 };
 
-// The receivers that the sun may reach.
-std::vector<DirectLight::SunlitSlot> DirectLight::reached(const Sun& sun, const Receivers& receivers) const {
+// Of the receivers from `begin` to `end`, those that the sun may reach.
+std::vector<DirectLight::SunlitSlot> DirectLight::reached(const Sun& sun, const Receivers& receivers, std::size_t begin,
+                                                          std::size_t end) const {
   std::vector<SunlitSlot> found;
   int known_face = -1;
   std::vector<int> over_face, over_slot;
-  for (std::size_t i = 0; i < receivers.slots.size(); ++i) {
+  for (std::size_t i = begin; i < end; ++i) {
     if (mesh_.is_cluster(receivers.slots[i]) || glm::dot(sun.beam.direction_to_source, receivers.normals[i]) <= 0)
       continue;
     const int f = mesh_.slot(receivers.slots[i]).face;
@@ -68,6 +71,18 @@ std::vector<DirectLight::SunlitSlot> DirectLight::reached(const Sun& sun, const 
     found.push_back({i, is_behind, over_slot});
   }
   return found;
+}
+
+// The receivers that the sun may reach.
+std::vector<DirectLight::SunlitSlot> DirectLight::reached(const Sun& sun, const Receivers& receivers) const {
+  const std::size_t count = receivers.slots.size();
+  std::vector<std::vector<SunlitSlot>> found((count + kReceivers - 1) / kReceivers);
+  parallel_indices(found.size(), 1, [&](std::size_t k) {
+    found[k] = reached(sun, receivers, k * kReceivers, std::min(count, (k + 1) * kReceivers));
+  });
+  std::vector<SunlitSlot> all;
+  for (std::vector<SunlitSlot>& part : found) std::move(part.begin(), part.end(), std::back_inserter(all));
+  return all;
 }
 
 // Share of the sun's light that arrives at lifted points of a slot, but for what comes through a small opening first.
@@ -196,12 +211,12 @@ void DirectLight::add_sun(const Beam& sun, const Receivers& receivers, const Pat
     place_of_slot[receivers.slots[candidates[k].receiver]] = static_cast<int>(k);
   const int per_slot = mesh_.elements_per_slot();
   std::vector<float> evenly_lit(candidates.size());  // what all samples of a slot say, or -1
-  for (std::size_t k = 0; k < candidates.size(); ++k) {
+  parallel_indices(candidates.size(), kReceivers, [&](std::size_t k) {
     const auto first = share.begin() + static_cast<std::ptrdiff_t>(k) * per_slot * kSamplesPerElement;
     const bool is_even =
         std::all_of(first, first + per_slot * kSamplesPerElement, [&](float s) { return s == *first; });
     evenly_lit[k] = is_even ? *first : -1;
-  }
+  });
   parallel_indices(candidates.size(), kGrain, [&](std::size_t k) {
     const std::size_t i = candidates[k].receiver;
     const glm::vec3 full = sun.normal_illuminance * glm::dot(sun.direction_to_source, receivers.normals[i]);

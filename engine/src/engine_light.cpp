@@ -135,14 +135,24 @@ std::vector<glm::vec4> Engine::sent_by_nodes_and_patches(const Lighting& lightin
   return sent;
 }
 
+HalfColours Engine::smooth_light_of_patches(const Lighting& lighting) const {
+  const std::vector<glm::vec3>& radiosity = lighting.patch_smooth_radiosity;
+  if (!lighting.plan.is_grey) {
+    std::vector<glm::vec4> colours(radiosity.size());
+    for (std::size_t p = 0; p < radiosity.size(); ++p) colours[p] = glm::vec4(radiosity[p], 0);
+    return HalfColours(colours);
+  }
+  std::vector<float> greys(radiosity.size());
+  for (std::size_t p = 0; p < radiosity.size(); ++p) greys[p] = radiosity[p].x;
+  return HalfColours(greys);
+}
+
 // Indirect light at nodes, from the irradiance of patches.
 void Engine::gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& first_reflection) const {
   const TracePhase phase(trace_, "gather");
   find_smooth_radiosity(lighting);
-  std::vector<glm::vec4> radiosity(slot_of_patch_.size());
-  for (std::size_t p = 0; p < radiosity.size(); ++p) radiosity[p] = glm::vec4(lighting.patch_smooth_radiosity[p], 0);
   lighting.node_indirect.resize(first_reflection.size());
-  const HalfColours sent_by_patches(radiosity, lighting.plan.is_grey);
+  const HalfColours sent_by_patches = smooth_light_of_patches(lighting);
   parallel_indices(first_reflection.size(), 64, [&](std::size_t i) {
     lighting.node_indirect[i] = first_reflection[i] + node_patches_.dot(i, sent_by_patches);
   });

@@ -15,6 +15,7 @@ struct FrameRenderer::Drawing {
   CameraRays camera;
   glm::vec3 eye;
   bool has_components;
+  const SkyPicture* sky;
   Frame& frame;
   std::vector<SeenBeam> beams{};
   const Masks* masks = nullptr;  ///< of stencil volumes; null: by rays

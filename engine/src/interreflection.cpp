@@ -6,6 +6,7 @@
 #include <map>
 #include <stdexcept>
 #include <tuple>
+#include <utility>
 
 #include "transom/parallel.h"
 
@@ -14,6 +15,7 @@ namespace {
 
 constexpr int kLargestClusterCount = 320;
 constexpr std::size_t kGrain = 128;
+constexpr std::size_t kBrightParts = 4;  // of bright patches, whose light is found at the same time
 constexpr float kLikeness = 3e-4f;      // of what a patch receives: what a group may err by
 constexpr std::size_t kProbeStep = 37;  // patches, between those that are lit to measure how fast light converges
 constexpr double kSafety = 2;           // on what has been measured
@@ -186,21 +188,41 @@ void Interreflection::begin(const PatchLight& light, std::vector<Value>& left, s
   left.resize(n);
   radiosity.assign(n, Value(0));
   for (std::size_t i = 0; i < n; ++i) left[i] = to(Value(), light.emitted[i] + reflectance_[i] * light.direct[i]);
-  std::vector<Value> received(n, Value(0));
-  for (const int bright : light.bright) {
-    const auto j = static_cast<std::size_t>(bright);
-    radiosity[j] = left[j];
-    left[j] = Value(0);
-    const Value flux = areas_[j] * radiosity[j];
-    for (std::size_t k = form_factors_.begin[j]; k < form_factors_.begin[j + 1]; ++k) {
-      const Share& share = form_factors_.entries[k];
-      received[share.index] += share.weight / areas_[share.index] * flux;
-    }
-    for (std::size_t k = sent_through_.begin[j]; k < sent_through_.begin[j + 1]; ++k)
-      received[sent_through_.entries[k].index] += sent_through_.entries[k].weight * radiosity[j];
-  }
   if (light.bright.empty()) return;
-  for (std::size_t i = 0; i < n; ++i) left[i] += to(Value(), reflectance_[i]) * received[i];
+  for (const int bright : light.bright) std::swap(radiosity[bright], left[bright]);
+  // Bright patches in parts, always the same ones: what these send is added up in one order.
+  std::vector<std::vector<Value>> received(kBrightParts);
+  parallel_indices(kBrightParts, 1, [&](std::size_t part) {
+    const auto begin_of = [&](std::size_t number) { return number * light.bright.size() / kBrightParts; };
+    received[part] =
+        received_from(light.bright.subspan(begin_of(part), begin_of(part + 1) - begin_of(part)), radiosity);
+  });
+  parallel_indices(n, kGrain, [&](std::size_t i) {
+    Value all(0);
+    for (const std::vector<Value>& part : received) all += part[i];
+    left[i] += to(Value(), reflectance_[i]) * all;
+  });
+}
+
+// Irradiance of all patches by what some of them send, by the columns of the exchange: those of F are its rows, times
+// the ratio of areas.
+template <typename Value>
+std::vector<Value> Interreflection::received_from(std::span<const int> senders,
+                                                  const std::vector<Value>& radiosity) const {
+  std::vector<Value> received(areas_.size(), Value(0));
+  for (const int sender : senders) {
+    const Value flux = areas_[sender] * radiosity[sender];
+    const auto row = static_cast<std::size_t>(sender);
+    for (std::size_t k = form_factors_.begin[row]; k < form_factors_.begin[row + 1]; ++k)
+      received[form_factors_.entries[k].index] += form_factors_.entries[k].weight * flux;
+  }
+  for (std::size_t i = 0; i < received.size(); ++i) received[i] /= std::max(areas_[i], 1e-30f);
+  for (const int sender : senders) {
+    const auto row = static_cast<std::size_t>(sender);
+    for (std::size_t k = sent_through_.begin[row]; k < sent_through_.begin[row + 1]; ++k)
+      received[sent_through_.entries[k].index] += sent_through_.entries[k].weight * radiosity[sender];
+  }
+  return received;
 }
 
 // Adds to a radiosity what is left over, and all that its further reflections bring, by the likeness. The clusters

@@ -62,13 +62,6 @@ void Condition::validate(int sky_bin_count) const {
     if (!(ground_luminance[c] >= 0 && std::isfinite(ground_luminance[c])) ||
         !(sky_colour[c] >= 0 && std::isfinite(sky_colour[c])))
       throw InputError("the ground's luminance or the sky's colour is negative or not finite");
-  if (picture.size() != static_cast<std::size_t>(picture_width) * static_cast<std::size_t>(picture_height))
-    throw InputError("the picture of the sky does not have width x height texels");
-  if (!picture.empty() && picture_height < 2)
-    throw InputError("the picture of the sky has no row besides that of the zenith");
-  for (const float texel : picture)
-    if (!(texel >= 0 && std::isfinite(texel)))
-      throw InputError("the picture of the sky holds a value that is negative or not finite");
 }
 
 std::vector<Beam> Condition::beams_at_points() const {
@@ -79,29 +72,33 @@ std::vector<Beam> Condition::beams_at_points() const {
   return at_points;
 }
 
-glm::vec2 Condition::place_in_pictures(glm::vec3 direction) {
+glm::vec3 Condition::seen(glm::vec3 direction, glm::vec2 place, const SkyBinIndex& bins,
+                          const SkyPicture* picture) const {
+  if (direction.z < 0) return ground_luminance;
+  return (picture ? picture->at(place) : sky_luminance[bins(direction)]) * sky_colour;
+}
+
+void SkyPicture::validate() const {
+  if (height < 2 || luminance.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height))
+    throw InputError("the picture of the sky does not have width x height texels in at least two rows");
+  for (const float texel : luminance)
+    if (!(texel >= 0 && std::isfinite(texel)))
+      throw InputError("the picture of the sky holds a value that is negative or not finite");
+}
+
+glm::vec2 SkyPicture::place_of(glm::vec3 direction) {
   return {azimuth_of(direction) / kTwoPi, std::acos(std::min(direction.z, 1.f)) / (kTwoPi / 4)};
 }
 
-glm::vec3 Condition::seen(glm::vec3 direction, const SkyBinIndex& bins) const {
-  const bool is_in_picture = direction.z >= 0 && !picture.empty();
-  return seen(direction, is_in_picture ? place_in_pictures(direction) : glm::vec2(0), bins);
-}
-
-glm::vec3 Condition::seen(glm::vec3 direction, glm::vec2 place, const SkyBinIndex& bins) const {
-  if (direction.z < 0) return ground_luminance;
-  if (picture.empty()) return sky_luminance[bins(direction)] * sky_colour;
-  const float y = place.y * static_cast<float>(picture_height - 1);
-  const float x = place.x * static_cast<float>(picture_width) - 0.5f;
-  const int y0 = std::min(static_cast<int>(y), picture_height - 2);
+float SkyPicture::at(glm::vec2 place) const {
+  const float y = place.y * static_cast<float>(height - 1);
+  const float x = place.x * static_cast<float>(width) - 0.5f;
+  const int y0 = std::min(static_cast<int>(y), height - 2);
   const int x0 = static_cast<int>(std::floor(x));
   const float fy = y - static_cast<float>(y0), fx = x - static_cast<float>(x0);
-  const auto texel = [&](int column, int row) {
-    return picture[row * picture_width + (column + picture_width) % picture_width];
-  };
-  const float luminance = (1 - fy) * ((1 - fx) * texel(x0, y0) + fx * texel(x0 + 1, y0)) +
-                          fy * ((1 - fx) * texel(x0, y0 + 1) + fx * texel(x0 + 1, y0 + 1));
-  return luminance * sky_colour;
+  const auto texel = [&](int column, int row) { return luminance[row * width + (column + width) % width]; };
+  return (1 - fy) * ((1 - fx) * texel(x0, y0) + fx * texel(x0 + 1, y0)) +
+         fy * ((1 - fx) * texel(x0, y0 + 1) + fx * texel(x0 + 1, y0 + 1));
 }
 
 }  // namespace transom

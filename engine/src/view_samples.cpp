@@ -60,7 +60,7 @@ BeamPoint add_sample(const Engine& engine, const Seen& seen, float weight, int p
   }
   if (point.surface < 0) {
     row.outlooks.push_back(
-        {pixel, weight * seen.through, seen.direction, Condition::place_in_pictures(seen.direction)});
+        {pixel, weight * seen.through, seen.direction, SkyPicture::place_of(seen.direction)});
     return point;
   }
   const NodeShares shares = engine.shown_at(seen.hit.face, seen.hit.side, seen.hit.st, point.position);

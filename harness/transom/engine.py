@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from transom import _engine
 from transom.daylight.condition import Condition
+from transom.daylight.environment import dome_image
 from transom.daylight.sky_bins import SkyBins
 from transom.daylight.sun_disc import Sun, SunPlan, plan_sun
 from transom.engine_scene import engine_condition, engine_geometry, fenestration_of, what_else_changed
@@ -25,6 +26,9 @@ Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 Visibility = Literal["rays", "volumes"]
 Method = Literal["gather", "classic"]
+
+SKY_PICTURE_HEIGHT = 64
+"""Rows, from zenith to horizon, of the picture of the sky that is seen through openings."""
 
 SKY_SUBDIVISION = 4
 """Reinhart's MF: 2305 bins. Coarser bins blur the sun's surroundings in a clear sky."""
@@ -100,6 +104,7 @@ class Engine:
     _core: _engine.Engine = field(repr=False)
     condition: Condition | None = None
     present_sun: SunPlan = field(default_factory=SunPlan)
+    _seen_sky: tuple[Condition, _engine.SkyPicture] | None = field(default=None, repr=False)
 
     @classmethod
     def solve(cls, scene: Scene, options: SolveOptions | None = None, *, trace: bool = False) -> Self:
@@ -218,7 +223,7 @@ class Engine:
         self._require_light()
         method = _engine.Visibility.VOLUMES if visibility == "volumes" else _engine.Visibility.RAYS
         try:
-            result = self._core.render(_core_view(view), method, edge_samples, components)
+            result = self._core.render(_core_view(view), method, edge_samples, components, self._sky_picture())
         except _engine.EngineInputError as error:
             raise InputError(str(error), file=self.scene.file, field=f"views.{view.name}") from None
         names = ("sun", "sky", "indirect", "emitted", "exterior") if components else ()
@@ -315,9 +320,17 @@ class Engine:
         """Classic method: rays cast from sun, sky and ground in the last relighting."""
         return int(self._core.forward_rays)
 
-    def _require_light(self) -> None:
+    def _sky_picture(self) -> _engine.SkyPicture:
+        """Of the present condition, whose light does not need it: made when it is looked at, and kept."""
+        condition = self._require_light()
+        if self._seen_sky is None or self._seen_sky[0] is not condition:
+            self._seen_sky = condition, _engine.SkyPicture(dome_image(condition.sky, SKY_PICTURE_HEIGHT))
+        return self._seen_sky[1]
+
+    def _require_light(self) -> Condition:
         if self.condition is None:
             raise RuntimeError("relight the engine before looking at it")
+        return self.condition
 
 
 class Relighting:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from transom import _engine
 from transom.daylight.condition import Condition
-from transom.daylight.environment import dome_image
 from transom.daylight.sky_bins import SkyBins
 from transom.daylight.sun_disc import sub_sun_illuminance, sub_suns
 from transom.fenestration.light import panel_light
@@ -19,10 +18,6 @@ from transom.fenestration.through import Fenestration
 from transom.glass import diffuse_reflectance, transmittance_table
 from transom.scene import content_key
 from transom.scene.model import Scene
-
-SKY_PICTURE_HEIGHT = 64
-"""Rows, from zenith to horizon, of the picture of the sky that is seen through openings."""
-
 
 def engine_geometry(scene: Scene) -> _engine.SceneGeometry:
     """Faces, materials, openings and point sources; after the openings of the scene one more for each panel group."""
@@ -64,7 +59,6 @@ def engine_condition(scene: Scene, condition: Condition, sky_bins: SkyBins, sub_
         condition.bin_luminance(sky_bins, single=True).astype(np.float32, copy=False),
         _triple(condition.sky_rgb),
         _triple(condition.ground_luminance_rgb),
-        dome_image(condition.sky, SKY_PICTURE_HEIGHT),
     )
     if condition.sun_direction is None:
         return core_condition

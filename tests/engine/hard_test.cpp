@@ -116,18 +116,20 @@ TEST(ThinBlades, AThousandOfThemLoseNoLight) {
 TEST(Condition, LightThatIsNoNumberIsRefused) {
   Engine engine(roof_light_room(0.5f), tregenza(), small_options());
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  Condition sky = uniform_sky(1000), colour = uniform_sky(1000), direction = uniform_sky(1000),
-            picture = uniform_sky(1000), flat_picture = uniform_sky(1000);
+  Condition sky = uniform_sky(1000), colour = uniform_sky(1000), direction = uniform_sky(1000);
   sky.sky_luminance[7] = nan;
   colour.sky_colour.x = std::numeric_limits<float>::infinity();
   direction.beams.push_back({glm::vec3(nan), glm::vec3(1)});
-  picture.picture.assign(4, nan);
-  picture.picture_width = picture.picture_height = 2;
-  flat_picture.picture.assign(4, 1.f);
-  flat_picture.picture_width = 4;
-  flat_picture.picture_height = 1;
-  for (const Condition& bad : {sky, colour, direction, picture, flat_picture})
+  for (const Condition& bad : {sky, colour, direction})
     EXPECT_THROW(engine.relight(bad), InputError);
+}
+
+TEST(SkyPicture, WhatIsNoPictureIsRefused) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const SkyPicture dark{{0, 0, 0, 0}, 2, 2}, broken{{1, 1, nan, 1}, 2, 2}, negative{{1, 1, -1, 1}, 2, 2},
+      flat{{1, 1, 1, 1}, 4, 1}, small{{1, 1, 1}, 2, 2};
+  EXPECT_NO_THROW(dark.validate());
+  for (const SkyPicture& bad : {broken, negative, flat, small}) EXPECT_THROW(bad.validate(), InputError);
 }
 
 TEST(View, PlaceThatIsNoNumberIsRefused) {

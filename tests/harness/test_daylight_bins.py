@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from transom.daylight import SkyBins, resolve_condition
+from transom.daylight.sky_model import Floats
 from transom.scene.model import ConditionSpec, Site
 
 SITE = Site("London", math.radians(51.5), math.radians(-0.12), 0.0)
@@ -29,13 +30,42 @@ def test_bins_cover_the_hemisphere_once(subdivision: int) -> None:
 
 
 @pytest.mark.parametrize("subdivision", [1, 2, 4])
-def test_index_finds_every_centre_and_quadrature_node(subdivision: int) -> None:
+def test_means_are_taken_within_their_own_bins(subdivision: int) -> None:
+    """Of the number of the bin that each node is in: it is found again only where all nodes of a bin are."""
     bins = SkyBins(subdivision)
-    assert np.array_equal(bins.index(bins.directions), np.arange(bins.count))
-    nodes, weights = bins.quadrature()
-    expected = np.repeat(np.arange(bins.count), nodes.shape[1])
-    assert np.array_equal(bins.index(nodes.reshape(-1, 3)), expected)
-    assert weights.sum(axis=1) == pytest.approx(np.ones(bins.count))
+    numbers = np.arange(bins.count)
+    assert np.array_equal(bins.index(bins.directions), numbers)
+    found = bins.mean(lambda directions: bins.index(directions).astype(float), np.array([0.6, 0.0, 0.8]))
+    assert found == pytest.approx(numbers, abs=1e-9)
+
+
+def test_means_beside_the_sun_and_at_the_horizon_are_those_of_many_nodes() -> None:
+    """An indicatrix as steep as those of clear skies, on a gradation that ends at the horizon, against 40 x 40 cells
+    of equal solid angle a bin."""
+    sun = np.array([0.6, 0.0, 0.8])
+
+    def luminance(directions: Floats) -> Floats:
+        angle = np.arccos(np.clip(directions @ sun, -1, 1))
+        clear: Floats = (1 - np.exp(-0.15 / directions[:, 2])) * (1 + 24 * np.exp(-2.8 * angle))
+        return clear
+
+    bins = SkyBins(4)
+    row = np.repeat(np.arange(len(bins.row_counts)), bins.row_counts)
+    step = (np.arange(40) + 0.5) / 40
+    sines = np.sin(bins.row_altitude_edges)
+    sine = (sines[:-1, None] + np.diff(sines)[:, None] * step)[row]
+    azimuth = 2 * math.pi * ((np.arange(bins.count) - bins.row_offsets[row])[:, None] + step)
+    azimuth /= bins.row_counts[row][:, None]
+    across = np.sqrt(1 - sine**2)[:, :, None]
+    shape = (bins.count, 40, 40)
+    cells = np.stack(
+        [across * np.cos(azimuth)[:, None], across * np.sin(azimuth)[:, None], np.broadcast_to(sine[:, :, None], shape)],
+        axis=-1,
+    )
+    exact = luminance(cells.reshape(-1, 3)).reshape(bins.count, -1).mean(axis=1)
+    assert bins.mean(luminance, sun) == pytest.approx(exact, rel=2e-3)
+    total = (bins.mean(luminance, sun) * bins.solid_angles).sum()
+    assert total == pytest.approx((exact * bins.solid_angles).sum(), rel=3e-5)
 
 
 def test_random_directions_fall_in_bins_by_solid_angle() -> None:

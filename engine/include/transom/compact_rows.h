@@ -13,7 +13,7 @@ namespace transom {
 /// 0. One channel for grey light, else three and a blank.
 class HalfColours {
  public:
-  explicit HalfColours(const std::vector<glm::vec4>& colours, bool is_grey = false);
+  explicit HalfColours(const std::vector<glm::vec4>& colours);
   explicit HalfColours(const std::vector<float>& greys);
 
  private:

@@ -77,6 +77,7 @@ class DirectLight {
   struct SunlitSlot;
   class Sun;
   std::vector<SunlitSlot> reached(const Sun& sun, const Receivers& receivers) const;
+  std::vector<SunlitSlot> reached(const Sun& sun, const Receivers& receivers, std::size_t begin, std::size_t end) const;
   void sun_transmission(const Sun& sun, const SunlitSlot& slot, const Points& points, std::span<float> share) const;
   std::vector<float> sample_sun(const Sun& sun, const Receivers& receivers, const std::vector<SunlitSlot>& candidates,
                                 const Patterns& patterns) const;

@@ -218,6 +218,7 @@ class Engine {
   bool is_grey(const Condition& condition) const;
   std::shared_ptr<const Lighting> with_indirect_of(Lighting lighting, const Lighting* previous) const;
   void find_smooth_radiosity(Lighting& lighting) const;
+  HalfColours smooth_light_of_patches(const Lighting& lighting) const;
   std::vector<glm::vec4> sent_by_nodes_and_patches(const Lighting& lighting) const;
   std::vector<Share> resolved_by_nodes(const std::vector<Share>& elements) const;
   void gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& first_reflection) const;

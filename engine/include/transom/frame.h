@@ -24,6 +24,7 @@ struct FrameOptions {
   Visibility visibility = Visibility::kRays;
   int edge_samples = 4;    ///< per pixel and axis where an edge is found; 1: pixel centres only
   bool components = true;  ///< the parts of the picture beside their sum
+  const SkyPicture* sky = nullptr;  ///< what is seen of the condition's sky; null: its bins are
 };
 
 /// Gives memory that nobody has cleared: what is made in it is written once.

@@ -66,6 +66,8 @@ class Interreflection {
   template <typename Value>
   void begin(const PatchLight& light, std::vector<Value>& left, std::vector<Value>& radiosity) const;
   template <typename Value>
+  std::vector<Value> received_from(std::span<const int> senders, const std::vector<Value>& radiosity) const;
+  template <typename Value>
   double cycle(const PatchLight& light, std::vector<Value>& left, std::vector<Value>& radiosity,
                std::vector<glm::vec3>& irradiance) const;
   template <typename Value>

@@ -49,6 +49,19 @@ struct Residual {
   std::vector<glm::vec3> radiance;
 };
 
+/// What is seen of the sky: luminance [cd/m²], row 0 at the zenith, row j at pi/2 j / (height - 1) from it, column i at
+/// azimuth 2 pi (i + 1/2) / width from +x towards +y.
+struct SkyPicture {
+  std::vector<float> luminance;
+  int width = 0, height = 0;
+
+  void validate() const;
+  /// Where pictures show a direction above the horizon: azimuth in turns, angle from the zenith in right angles.
+  static glm::vec2 place_of(glm::vec3 direction);
+  /// Luminance at a place, between texels.
+  float at(glm::vec2 place) const;
+};
+
 /// Everything outdoors that can change from hour to hour.
 struct Condition {
   std::vector<Beam> beams;
@@ -60,19 +73,13 @@ struct Condition {
   std::vector<float> sky_luminance;  ///< one a sky bin [cd/m²]
   glm::vec3 sky_colour{1};           ///< RGB with Y = 1
   glm::vec3 ground_luminance{0};     ///< [cd/m²]
-  /// What is seen of the sky: luminance [cd/m²], row 0 at the zenith, row j at pi/2 j / (height - 1) from it, column i
-  /// at azimuth 2 pi (i + 1/2) / width from +x towards +y. Empty: the bins are shown.
-  std::vector<float> picture;
-  int picture_width = 0, picture_height = 0;
 
   void validate(int sky_bin_count) const;
   /// Beams at points: sub-suns, where there are any, in place of the sun; lobes.
   std::vector<Beam> beams_at_points() const;
-  glm::vec3 seen(glm::vec3 direction, const SkyBinIndex& bins) const;
-  /// The same for a direction whose place in pictures is known.
-  glm::vec3 seen(glm::vec3 direction, glm::vec2 place, const SkyBinIndex& bins) const;
-  /// Where pictures show a direction above the horizon: azimuth in turns, angle from the zenith in right angles.
-  static glm::vec2 place_in_pictures(glm::vec3 direction);
+  /// Radiance of sky or ground in a direction, whose place in pictures of the sky is known. picture: of this sky; null:
+  /// its bins are seen.
+  glm::vec3 seen(glm::vec3 direction, glm::vec2 place, const SkyBinIndex& bins, const SkyPicture* picture) const;
 };
 
 }  // namespace transom

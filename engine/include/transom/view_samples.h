@@ -69,7 +69,7 @@ struct ViewSamples {
     int pixel;
     float weight;
     glm::vec3 direction;
-    glm::vec2 place;  ///< Condition::place_in_pictures
+    glm::vec2 place;  ///< SkyPicture::place_of
   };
 
   /// Exit bins of panels in which their light is seen.

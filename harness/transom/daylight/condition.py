@@ -77,10 +77,7 @@ class Condition:
 
         single: calculated in single precision, within 1e-5 and several times as fast.
         """
-        directions, weights = bins.quadrature(single=single)
-        luminance = self.sky.luminance(directions.reshape(-1, 3)).reshape(weights.shape)
-        mean: Floats = (luminance * weights).sum(axis=1)
-        return mean
+        return bins.mean(self.sky.luminance, np.array(self.sky.sun_direction), single=single)
 
     def environment_image(self, height: int) -> Float32:
         """Sky and ground as a latitude-longitude image (height, 2 height, 3) [cd/m²], without the sun.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,12 @@ from numpy.typing import NDArray
 Floats = NDArray[np.floating[Any]]
 Float64 = NDArray[np.float64]
 Int32 = NDArray[np.int32]
+
+STEEP_ORDER = 4
+STEEP_ANGLE_RAD = math.radians(6)
+"""Nodes a bin and direction where the sky is steep, and the angle around the sun within which it is: one hour's
+irradiance of a wall is then right to 1.2e-4 for every CIE sky, and for Perez's from clearness 1 to 9. With 3 x 3 nodes
+in all bins it is to 1.2e-3."""
 
 TREGENZA_ROW_COUNTS = (30, 30, 24, 24, 18, 12, 6)
 """Bins in each row from the horizon up, below the zenith cap. [Tregenza 1987]"""
@@ -48,9 +55,10 @@ class SkyBins:
         row = np.repeat(np.arange(len(self.row_counts)), self.row_counts)
         turn = (np.arange(self.count) - self.row_offsets[row] + 0.5) / self.row_counts[row]
         self.directions: Float64 = _unit_vectors(altitudes[row], 2 * math.pi * turn)
-        nodes, weights = self._quadrature()
-        self._double_quadrature: tuple[Floats, Floats] = (nodes, weights)
-        self._single_quadrature: tuple[Floats, Floats] = (nodes.astype(np.float32), weights.astype(np.float32))
+        order = {1: 10, 2: 4}.get(m, 2)  # the larger the bins, the more nodes
+        smooth, steep = self._quadrature(order), self._quadrature(max(order, STEEP_ORDER))
+        self._double = smooth, steep
+        self._single = _in_single_precision(smooth), _in_single_precision(steep)
 
     def index(self, directions: Float64) -> Int32:
         """Bin of each direction (N, 3), unit vectors -> (N,); -1 below the horizon."""
@@ -60,16 +68,22 @@ class SkyBins:
         column = np.minimum(turn * self.row_counts[row], self.row_counts[row] - 1).astype(np.int32)
         return np.where(altitude < 0, -1, self.row_offsets[row] + column).astype(np.int32)
 
-    def quadrature(self, *, single: bool = False) -> tuple[Floats, Floats]:
-        """Unit vectors (count, Q, 3) and weights (count, Q), summing to 1 a bin, for means over the solid angle.
+    def mean(self, luminance: Callable[[Floats], Floats], steep: Float64, *, single: bool = False) -> Floats:
+        """Mean over each bin's solid angle (count,) of luminance(unit vectors (N, 3)) -> (N,).
 
-        single: in single precision.
+        steep: unit vector (3,) around which, as along the horizon, the sky changes so much within a bin that more nodes
+        are taken. single: in single precision, several times as fast.
         """
-        return self._single_quadrature if single else self._double_quadrature
+        smooth, fine = self._single if single else self._double
+        mean = _weighted(luminance, *smooth)
+        is_steep = self.directions @ steep > math.cos(STEEP_ANGLE_RAD + self.row_altitude_edges[1])
+        is_steep[: self.row_counts[0]] = True
+        mean[is_steep] = _weighted(luminance, fine[0][is_steep], fine[1][is_steep])
+        return mean
 
-    def _quadrature(self) -> tuple[Float64, Float64]:
-        """Gauss-Legendre in sin(altitude) and azimuth: 10 x 10 nodes in Tregenza's bins, 4 x 4 at m = 2, else 3 x 3."""
-        order = 10 if self.subdivision == 1 else 4 if self.subdivision == 2 else 3
+    def _quadrature(self, order: int) -> tuple[Float64, Float64]:
+        """Unit vectors (count, order², 3) and weights (count, order²), summing to 1 a bin, for means over its solid
+        angle: Gauss-Legendre in sin(altitude) and azimuth."""
         node, weight = np.polynomial.legendre.leggauss(order)
         node, weight = (node + 1) / 2, weight / 2
         row = np.repeat(np.arange(len(self.row_counts)), self.row_counts)
@@ -86,6 +100,16 @@ class SkyBins:
             np.broadcast_to(azimuth[:, None, :], shape).reshape(self.count, -1),
         )
         return nodes, weights
+
+
+def _weighted(luminance: Callable[[Floats], Floats], nodes: Floats, weights: Floats) -> Floats:
+    mean: Floats = np.einsum("ij,ij->i", luminance(nodes.reshape(-1, 3)).reshape(weights.shape), weights)
+    return mean
+
+
+def _in_single_precision(quadrature: tuple[Float64, Float64]) -> tuple[Floats, Floats]:
+    nodes, weights = quadrature
+    return nodes.astype(np.float32), weights.astype(np.float32)
 
 
 def _unit_vectors(altitude: Float64, azimuth: Float64) -> Float64:
