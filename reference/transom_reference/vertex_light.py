@@ -27,9 +27,13 @@ PANEL_DIMENSION = 1 << 17
 DIMENSION_PAIRS = 6
 """Pairs of numbers that one step of a path uses."""
 
-VERTEX_CANDIDATES = 8
+VERTEX_CANDIDATES = 2
 PATCH_CANDIDATES = 8
 """Light vertices and sun patches among which one is chosen for a connection, by what it would bring if visible."""
+
+VERTEX_CONNECTIONS = 4
+"""Light vertices to which a vertex of a path is connected: whether they are seen is most of the noise of rooms with much
+hidden from the brightest places."""
 
 
 @dataclass(frozen=True)
@@ -197,7 +201,8 @@ class VertexLight:
         may = here.active & here.indoors
 
         def candidate(part: int) -> tuple[Any, tuple[Any, ...]]:
-            place, normal, power = vertices.choose((choice + part) * (1.0 / VERTEX_CANDIDATES), may)
+            strata = VERTEX_CONNECTIONS * VERTEX_CANDIDATES
+            place, normal, power = vertices.choose((choice + part) * (1.0 / strata), may)
             towards, squared, cosine, seen = _towards(here, place)
             other_cosine = -dr.dot(normal, towards)
             seen &= may & (other_cosine > 0.0) & (squared > 1e-8)
@@ -205,12 +210,21 @@ class VertexLight:
             value = flow * self.connection_density / (self.connection_density + flow * INVERSE_PI)
             return dr.select(seen, dr.max(power) * value, 0.0), (towards, squared, power)
 
-        total, chosen, (towards, squared, power) = resample(candidate, VERTEX_CANDIDATES, number)
-        ray = mi.Ray3f(here.outside, towards)
-        ray.maxt = dr.sqrt(squared) * (1.0 - 1e-5)
-        seen = may & (chosen > 0.0)
-        seen &= ~self.scene.all.ray_test(ray, active=seen)
-        return dr.select(seen, here.factor * (power / dr.max(power)) * total, 0.0)
+        found = mi.Color3f(0.0)
+        for connection in range(VERTEX_CONNECTIONS):
+            # Its candidates are far apart among the vertices; the number is as far from those of the other connections.
+            turned = number + connection / VERTEX_CONNECTIONS
+            total, chosen, (towards, squared, power) = resample(
+                lambda k, connection=connection: candidate(k * VERTEX_CONNECTIONS + connection),
+                VERTEX_CANDIDATES,
+                dr.select(turned < 1.0, turned, turned - 1.0),
+            )
+            ray = mi.Ray3f(here.outside, towards)
+            ray.maxt = dr.sqrt(squared) * (1.0 - 1e-5)
+            seen = may & (chosen > 0.0)
+            seen &= ~self.scene.all.ray_test(ray, active=seen)
+            found = found + dr.select(seen, (power / dr.max(power)) * total, 0.0)
+        return here.factor * found * (1.0 / VERTEX_CONNECTIONS)
 
     def point_source(self, here: Vertex) -> Any:
         """One point source, chosen evenly."""
