@@ -32,8 +32,8 @@ PATCH_CANDIDATES = 8
 """Light vertices and sun patches among which one is chosen for a connection, by what it would bring if visible."""
 
 VERTEX_CONNECTIONS = 4
-"""Light vertices to which a vertex of a path is connected: whether they are seen is most of the noise of rooms with much
-hidden from the brightest places."""
+"""Light vertices to which a vertex of a path is connected. Whether they are seen is most of the noise where much of a
+room is hidden from its brightest places."""
 
 
 @dataclass(frozen=True)
