@@ -210,9 +210,13 @@ class Bundle:
 
 @dataclass(frozen=True)
 class BatchStore:
-    """Finished batches of an unfinished reference: each is an .npz file named by its number."""
+    """Finished batches of an unfinished reference: each is an .npz file named by its number.
+
+    first: number of the first one that is wanted; those before it are part of an answer that is already there.
+    """
 
     folder: Path
+    first: int = 0
 
     def has(self, index: int) -> bool:
         return self._path(index).is_file()
@@ -233,8 +237,8 @@ class BatchStore:
         write_atomic(self._path(index), stream.getvalue())
 
     def count(self) -> int:
-        """How many there are."""
-        return sum(1 for path in self.folder.glob("[0-9]*.npz"))
+        """How many there are that are wanted."""
+        return sum(1 for path in self.folder.glob("[0-9]*.npz") if int(path.stem) >= self.first)
 
     def _path(self, index: int) -> Path:
         return self.folder / f"{index:04d}.npz"
@@ -259,8 +263,8 @@ class Store:
                     return bundle
         return None
 
-    def batches(self, case: Case) -> BatchStore:
-        return BatchStore(self.folder(case) / "batches")
+    def batches(self, case: Case, first: int = 0) -> BatchStore:
+        return BatchStore(self.folder(case) / "batches", first)
 
     def write(
         self,

@@ -19,18 +19,16 @@ from transom.errors import InputError, StorageError
 from transom.failures import clear_failure, write_failure
 from transom.files import require_writable
 from transom.noise import mean_relative_standard_error
+from transom.pooling import finished_batches, group_means, pooled_image, pooled_sensors
 from transom.renderer import ImageResult, Progress, Renderer, SensorResult
 from transom.scene.model import Scene, View
 from transom.sensor_file import SensorTable, scene_sensors
 from transom.staging import sweep
 from transom.suite import Suite, SuiteCase
-from transom.visible import first_surfaces, region_masks
+from transom.visible import first_surfaces
 
 SENSOR_TARGET_PERCENT = 0.2
 """Standard error of a published illuminance, relative to it (median over a scene's sensors)."""
-
-MEAN_GROUPS = 64
-"""Groups of batches whose means are kept, for the uncertainty of a reference's mean."""
 
 LEAST_BATCHES = 32
 """Published references have at least so many batches, so that Student's quantile stays near the normal one."""
@@ -45,6 +43,9 @@ DEFAULT_METHOD = "gather"
 
 COARSE_VISIBILITY = "volumes"
 """Visibility method of the solve with fewer patches; the other method's picture changes with it alike."""
+
+LEAST_ADDED = 2
+"""Fewer batches have no standard error, nor two halves."""
 
 GREATEST_GROWTH = 4.0
 """A noise estimate from few batches is not trusted to order more than this many times what was rendered."""
@@ -74,14 +75,14 @@ def render_case(
     progress: Progress | None = None,
     *,
     fresh: bool = False,
-    keep_batches: bool = False,
     wait: bool = True,
 ) -> Bundle:
     """The bundle of a case: found in the repository or the cache, else rendered and written to `store` (the cache).
 
-    fresh: render again even when an answer exists. A reference that has batches is resumed where it was stopped;
-    keep_batches: so that it can be made quieter later. A damaged answer counts as none. One process at a time renders
-    a case: the others wait for it, or with wait=False raise CaseBusyError. A failure leaves failed.json and is raised.
+    fresh: render again even when an answer exists. A reference that was stopped goes on from its last batch, and one
+    that is too noisy gets more batches (transom.pooling). A damaged answer counts as none. One process at a time
+    renders a case: the others wait for it, or with wait=False raise CaseBusyError. A failure leaves failed.json and is
+    raised.
     """
     case, store = question.case, store or cache_store()
     if not fresh:
@@ -97,7 +98,7 @@ def render_case(
         sweep(store.folder(case))
         sweep(cache_store().folder(case))
         try:
-            bundle = _render(renderer, question, store, progress, found, fresh, keep_batches)
+            bundle = _render(renderer, question, store, progress, found, fresh)
         except StorageError:
             raise
         except Exception as error:
@@ -122,7 +123,6 @@ def _render(
     progress: Progress | None,
     found: Bundle | None,
     fresh: bool,
-    keep_batches: bool,
 ) -> Bundle:
     case = question.case
     if fresh:
@@ -130,7 +130,7 @@ def _render(
     # The time of a reference counts from its first batch on.
     started = time.perf_counter() - (found.record.wall_seconds if found is not None else 0.0)
     if "batches" in renderer.default_options():
-        return _render_in_batches(renderer, question, store, progress, started, keep_batches)
+        return _render_in_batches(renderer, question, store, progress, started, found)
     if case.view is not None:
         image = renderer.render(case.scene, case.condition, case.view, case.options, progress)
         is_engine = renderer.name == "engine"  # Engine pictures are compared bit by bit with one another.
@@ -217,14 +217,17 @@ def coarse_options(renderer: Renderer) -> dict[str, Any] | None:
 
 
 def is_good_enough(bundle: Bundle, question: Question) -> bool:
-    """Whether an answer has the batches, and the quiet, that its question asks for."""
-    if question.target is None:
+    """Whether an answer has the batches, and the quiet, that its question asks for, or can have no more batches."""
+    target, facts = question.target, bundle.record.facts
+    if target is None:
         return True
-    facts = bundle.record.facts
-    if int(facts.get("batches", LEAST_BATCHES)) < _least_batches(question.target):
+    batches = int(facts.get("batches", LEAST_BATCHES))
+    if batches > target.max_batches - LEAST_ADDED:
+        return True
+    if batches < _least_batches(target):
         return False
     # 2 % of slack: a second estimate of the same noise differs a little from the one that stopped the rendering.
-    return float(facts.get("relative_standard_error_percent", 0.0)) <= 1.02 * question.target.percent
+    return float(facts.get("relative_standard_error_percent", 0.0)) <= 1.02 * target.percent
 
 
 def _render_in_batches(
@@ -233,12 +236,16 @@ def _render_in_batches(
     store: Store,
     progress: Progress | None,
     started: float,
-    keep_batches: bool,
+    found: Bundle | None,
 ) -> Bundle:
-    """Renders, estimates the noise, orders as many batches as the target needs, until it is met."""
+    """Renders, estimates the noise, orders as many batches as the target needs, until it is met.
+
+    found: an answer that is not good enough; it counts as its first batches.
+    """
     case, target = question.case, question.target
-    batches = cache_store().batches(case)
-    count = max(int(case.options["batches"]), 2) if target is None else _least_batches(target)
+    before = None if found is None else finished_batches(found, case)
+    batches = cache_store().batches(case, 0 if before is None else before.count)
+    count = _first_order(question, found)
     resumed = batches.count()
     image: ImageResult | None = None
     table: SensorTable | None = None
@@ -246,25 +253,45 @@ def _render_in_batches(
         options = {**case.options, "batches": count}
         if case.view is not None:
             image, facts = _picture(renderer, case, options, batches, progress)
+            image = image if before is None else pooled_image(before, image, count)
             percent = _image_percent(image, case.scene, case.view)
         else:
             table, facts = _measure(renderer, case, options, progress, batches)
+            table = table if before is None else pooled_sensors(before, table, count)
             percent = _sensor_percent(table)
         if target is None or percent <= target.percent or count >= target.max_batches:
             break
-        growth = min(1.02 * (percent / target.percent) ** 2, GREATEST_GROWTH)
-        count = min(max(count + 2, math.ceil(count * growth / 2) * 2), target.max_batches)
+        count = _next_order(count, percent, target)
     facts = {**facts, "relative_standard_error_percent": round(percent, 5), "batches": count}
     if resumed:
         facts["batches_resumed"] = resumed
+    if before is not None:
+        facts["batches_stored"] = before.count
     if case.view is not None:
-        facts["group_means_cd_m2"] = _group_means(batches, count, case.scene, case.view)
+        facts["group_means_cd_m2"] = group_means(before, batches, count, case.scene, case.view)
     case = replace(case, options={**case.options, "batches": count})
     seconds = time.perf_counter() - started
     bundle = store.write(case, image=image, sensors=table, facts=facts, wall_seconds=seconds)
-    if not keep_batches:
-        cache_store().drop_batches(case)
+    cache_store().drop_batches(case)
     return bundle
+
+
+def _first_order(question: Question, found: Bundle | None) -> int:
+    """How many batches to have before the noise is looked at: those found and what they say is missing."""
+    target = question.target
+    if target is None:
+        return max(int(question.case.options["batches"]), LEAST_ADDED)
+    if found is None:
+        return _least_batches(target)
+    facts = found.record.facts
+    more = _next_order(int(facts["batches"]), float(facts["relative_standard_error_percent"]), target)
+    return max(more, _least_batches(target))
+
+
+def _next_order(count: int, percent: float, target: Target) -> int:
+    """How many batches the target should need, an even number, when `count` of them have a noise of `percent`."""
+    growth = min(1.02 * (percent / target.percent) ** 2, GREATEST_GROWTH)
+    return min(max(count + LEAST_ADDED, math.ceil(count * growth / 2) * 2), target.max_batches)
 
 
 def _least_batches(target: Target) -> int:
@@ -294,22 +321,6 @@ def _measure(
     result: SensorResult = measure(case.scene, case.condition, points, normals, options, progress, **extra)
     table = case.sensors.measured(np.asarray(luminance(result.illuminance), np.float64), result.standard_error)
     return table, dict(result.facts)
-
-
-def _group_means(batches: BatchStore, count: int, scene: Scene, view: View) -> dict[str, list[float]]:
-    """By region, the mean luminance [cd/m²] of each of MEAN_GROUPS groups of batches (arrays `values`, (h, w, 3)).
-
-    Batches are independent whatever their pixels have in common, so that the spread of these means is the noise's.
-    """
-    masks = region_masks(scene, view)
-    groups = np.arange(count) % min(count, MEAN_GROUPS)
-    sums = {region: np.zeros(groups.max() + 1) for region in masks}
-    for index, group in enumerate(groups):
-        values = luminance(batches.load(index)["values"])
-        for region, mask in masks.items():
-            sums[region][group] += values[mask].mean()
-    sizes = np.bincount(groups)
-    return {region: [float(f"{value:.7g}") for value in total / sizes] for region, total in sums.items()}
 
 
 def _image_percent(image: ImageResult, scene: Scene, view: View) -> float:

@@ -27,7 +27,10 @@ SENSOR_LANES_PER_BATCH = 1 << 12
 
 
 class BatchStore(Protocol):
-    """Where finished batches are kept, so that a stopped run repeats nothing."""
+    """Where finished batches are kept, so that a stopped run repeats nothing. Those before `first` are left out."""
+
+    @property
+    def first(self) -> int: ...
 
     def has(self, index: int) -> bool: ...
 
@@ -63,7 +66,8 @@ class MitsubaRenderer:
     ) -> ImageResult:
         """The view's image (height, width, 3) [cd/m²], halves and standard error, from `options["batches"]` batches.
 
-        batches: finished batches are loaded from here and new ones saved. Raises InputError for options out of range.
+        batches: finished batches are loaded from here and new ones saved; the answer is of `batches.first` and those
+        after it, by number below `options["batches"]`. Raises InputError for options out of range.
         """
         settings = self._settings(options)
         transport = build_transport_scene(scene, condition, full_physics=settings["physics"] == "full")
@@ -170,8 +174,8 @@ class _Summary:
         self.luminance_mean: Any = 0.0
         self.squares: Any = 0.0
 
-    def add(self, values: NDArray[Any]) -> None:
-        half = self.count % 2
+    def add(self, index: int, values: NDArray[Any]) -> None:
+        half = index % 2
         self.count += 1
         self.counts[half] += 1
         self.sums[half] = self.sums[half] + values.astype(np.float64)
@@ -201,9 +205,10 @@ def _run_batches(
 ) -> _Summary:
     """Batch i depends on the seed and i alone, so that more batches can be added to a finished run."""
     summary, began, total = _Summary(), time.perf_counter(), int(settings["batches"])
+    first = 0 if store is None else store.first
     if progress is not None:
-        progress(0, total)
-    for index in range(total):
+        progress(first, total)
+    for index in range(first, total):
         if store is not None and store.has(index):
             values = np.asarray(store.load(index)["values"])
             summary.loaded += 1
@@ -211,7 +216,7 @@ def _run_batches(
             values = trace(_batch_seed(int(settings["seed"]), index))
             if store is not None:
                 store.save(index, {"values": values})
-        summary.add(values)
+        summary.add(index, values)
         if progress is not None:
             progress(index + 1, total)
     summary.seconds = time.perf_counter() - began

@@ -27,9 +27,13 @@ PANEL_DIMENSION = 1 << 17
 DIMENSION_PAIRS = 6
 """Pairs of numbers that one step of a path uses."""
 
-VERTEX_CANDIDATES = 8
+VERTEX_CANDIDATES = 2
 PATCH_CANDIDATES = 8
 """Light vertices and sun patches among which one is chosen for a connection, by what it would bring if visible."""
+
+VERTEX_CONNECTIONS = 4
+"""Light vertices to which a vertex of a path is connected. Whether they are seen is most of the noise where much of a
+room is hidden from its brightest places."""
 
 
 @dataclass(frozen=True)
@@ -190,14 +194,22 @@ class VertexLight:
         return dr.select(seen & (passed > 0.0), here.factor * radiance * strength, 0.0)
 
     def light_vertex(self, here: Vertex) -> Any:
-        """Light reflected indoors, except the sun's first reflection, by a light vertex with the connection's share."""
+        """Light reflected indoors, except the sun's first reflection, by light vertices with the connections' share."""
+        choice, number = self._numbers(here, 5)
+        found = [self._connected(here, choice, number, connection) for connection in range(VERTEX_CONNECTIONS)]
+        return here.factor * sum(found, mi.Color3f(0.0)) * (1.0 / VERTEX_CONNECTIONS)
+
+    def _connected(self, here: Vertex, choice: Any, number: Any, connection: int) -> Any:
+        """What one connection brings. The candidates of all are from equal parts of the vertices, which lie in order of
+        place, each connection's as far apart as can be; its number for choosing among them is a turn of the others'."""
         vertices = self.batch.vertices
         assert vertices is not None
-        choice, number = self._numbers(here, 5)
         may = here.active & here.indoors
+        parts = VERTEX_CONNECTIONS * VERTEX_CANDIDATES
 
         def candidate(part: int) -> tuple[Any, tuple[Any, ...]]:
-            place, normal, power = vertices.choose((choice + part) * (1.0 / VERTEX_CANDIDATES), may)
+            own = part * VERTEX_CONNECTIONS + connection
+            place, normal, power = vertices.choose((choice + own) * (1.0 / parts), may)
             towards, squared, cosine, seen = _towards(here, place)
             other_cosine = -dr.dot(normal, towards)
             seen &= may & (other_cosine > 0.0) & (squared > 1e-8)
@@ -205,12 +217,14 @@ class VertexLight:
             value = flow * self.connection_density / (self.connection_density + flow * INVERSE_PI)
             return dr.select(seen, dr.max(power) * value, 0.0), (towards, squared, power)
 
-        total, chosen, (towards, squared, power) = resample(candidate, VERTEX_CANDIDATES, number)
+        turned = number + connection / VERTEX_CONNECTIONS
+        turned = dr.select(turned < 1.0, turned, turned - 1.0)
+        total, chosen, (towards, squared, power) = resample(candidate, VERTEX_CANDIDATES, turned)
         ray = mi.Ray3f(here.outside, towards)
         ray.maxt = dr.sqrt(squared) * (1.0 - 1e-5)
         seen = may & (chosen > 0.0)
         seen &= ~self.scene.all.ray_test(ray, active=seen)
-        return dr.select(seen, here.factor * (power / dr.max(power)) * total, 0.0)
+        return dr.select(seen, (power / dr.max(power)) * total, 0.0)
 
     def point_source(self, here: Vertex) -> Any:
         """One point source, chosen evenly."""

@@ -76,7 +76,8 @@ class NoisyRenderer:
         shape = (view.height, view.width)
         values = self._batches(shape, batches, progress, options)
         mean, error = values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(len(values))
-        halves = (grey(values[0::2].mean(axis=0)), grey(values[1::2].mean(axis=0)))
+        turn = 0 if batches is None else batches.first % 2
+        halves = (grey(values[turn::2].mean(axis=0)), grey(values[1 - turn :: 2].mean(axis=0)))
         return ImageResult(grey(mean), halves, error.astype(np.float32), facts={"samples": 1})
 
     def illuminance(
@@ -101,7 +102,8 @@ class NoisyRenderer:
         progress: Progress | None,
         options: Mapping[str, Any],
     ) -> NDArray[np.float64]:
-        return np.stack([self._batch(index, shape, batches, progress, options) for index in range(options["batches"])])
+        wanted = range(0 if batches is None else batches.first, options["batches"])
+        return np.stack([self._batch(index, shape, batches, progress, options) for index in wanted])
 
     def _batch(
         self,

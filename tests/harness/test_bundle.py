@@ -126,7 +126,7 @@ def test_reference_stops_when_its_noise_meets_the_target_and_not_much_later() ->
 def test_few_batches_are_not_enough_to_judge_by_however_quiet_they_are() -> None:
     renderer = NoisyRenderer(relative_noise=0.001)
     case = image_case(renderer)
-    preview = render_case(renderer, Question(case, Target(4.0)), repository_store(), keep_batches=True)
+    preview = render_case(renderer, Question(case, Target(4.0)), repository_store())
     assert preview.record.facts["batches"] == run.PREVIEW_BATCHES
     judged = render_case(renderer, Question(case, Target(1.0)), repository_store())
     assert judged.record.facts["batches"] == run.LEAST_BATCHES
@@ -157,11 +157,11 @@ from harness_fakes import NoisyRenderer, small_condition, small_scene
 from transom.bundle import make_case, repository_store
 from transom import run, visible
 run._image_percent = lambda *_: 1.0
-run._group_means = lambda *_: {}
+run.group_means = lambda *_: {}
 scene = small_scene()
 for seed in range(1_000_000):
     case = make_case(scene, small_condition(), NoisyRenderer(), {"seed": seed, "batches": 6}, view=scene.views[0])
-    run.render_case(NoisyRenderer(), run.Question(case), repository_store(), keep_batches=True)
+    run.render_case(NoisyRenderer(), run.Question(case), repository_store())
     print("one is finished", flush=True)
 """
     for delay_s in (0.05, 0.21, 0.4):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ from rich.console import Console
 from transom import progress
 from transom.bundle import cache_store, repository_store
 from transom.progress import CaseProgress, duration_words
-from transom.references import published_questions, run_references
+from transom.references import STAGES, _work, published_questions, run_references
+from transom.run import Target, render_case
 from transom.scene.model import Scene, View
 from transom.visible import FirstSurfaces
 
@@ -81,6 +83,21 @@ def test_stopped_after_the_first_stage_every_case_has_a_reference(renderer: Nois
     with pytest.raises(KeyboardInterrupt):
         run_references(())
     assert all(repository_store().find(question.case) is not None for question in published_questions())
+
+
+def test_what_needs_least_comes_first_and_what_is_stored_is_not_needed(renderer: NoisyRenderer) -> None:
+    picture = next(question for question in published_questions() if question.case.kind == "image")
+    render_case(renderer, replace(picture, target=Target(1.5)), repository_store())
+    renderer.rendered.clear()
+    renderer.stop_after = 1
+    with pytest.raises(KeyboardInterrupt):
+        run_references(())
+    assert renderer.rendered == [0], "the sensors, of which nothing is there yet"
+    finished = repository_store().find(picture.case)
+    assert finished is not None
+    assert _work(picture, 1.0, 1.5) == 0.0 < _work(picture, 1.0, 2.1) < _work(picture, 1.0, 3.0)
+    assert _work(picture, 1.0, 3.0) < _work(picture, 1.0, None) == _work(picture, 1.0, 8.0)
+    assert sum(_work(picture, stage, None) for stage in STAGES) == pytest.approx(8 * 12 / 2.0**2)
 
 
 def test_remaining_time_follows_the_weights_of_the_cases(monkeypatch: pytest.MonkeyPatch) -> None:

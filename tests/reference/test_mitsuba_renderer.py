@@ -21,7 +21,8 @@ SMALL = {"samples": 4, "batches": 6}
 class MemoryStore:
     """Batches in memory; counts what was saved."""
 
-    def __init__(self) -> None:
+    def __init__(self, first: int = 0) -> None:
+        self.first = first
         self.kept: dict[int, dict[str, NDArray[Any]]] = {}
         self.saved = 0
 
@@ -48,6 +49,19 @@ def test_resumed_run_repeats_nothing_and_gives_the_same_image() -> None:
     assert store.saved == 1
     np.testing.assert_allclose(again.mean, first.mean, rtol=1e-5)
     assert again.facts["batches_loaded"] == 5
+
+
+def test_batches_before_the_first_wanted_are_left_out_and_the_others_are_the_same() -> None:
+    whole, later, view = MemoryStore(), MemoryStore(first=3), room_view(16, 12)
+    MitsubaRenderer().render(window_room(), CONDITION, view, SMALL, batches=whole)
+    image = MitsubaRenderer().render(window_room(), CONDITION, view, SMALL, batches=later)
+    assert sorted(later.kept) == [3, 4, 5]
+    values = np.array([whole.kept[index]["values"] for index in (3, 4, 5)])
+    np.testing.assert_array_equal(later.kept[4]["values"], values[1])
+    assert image.halves is not None
+    np.testing.assert_allclose(image.halves[0], values[1], rtol=1e-6)
+    np.testing.assert_allclose(image.halves[1], (values[0] + values[2]) / 2, rtol=1e-6)
+    np.testing.assert_allclose(image.mean, values.mean(axis=0), rtol=1e-6)
 
 
 def test_halves_average_to_the_mean() -> None:

@@ -12,6 +12,7 @@ from reference_rooms import GradedSky, PlainCondition, UniformSky, box_quads, ma
 
 from transom.glass import transmittance_table
 from transom.scene.model import Material, PointSource, Scene
+from transom_reference import vertex_light
 from transom_reference.analytic import perpendicular_rectangle_factor, refine_box, refine_cube
 from transom_reference.mitsuba_renderer import MitsubaRenderer, camera_rays
 from transom_reference.portal_integrator import PathOptions, PortalIntegrator
@@ -146,3 +147,18 @@ def test_connections_to_light_paths_change_nothing_but_the_noise(glazing: str) -
     assert errors[1].mean() < errors[0].mean()
     assert abs(means[1].sum() / means[0].sum() - 1) < SIGMAS * uncertainty + 1e-3
     assert abs(relative.mean()) < 0.005
+
+
+def test_more_connections_of_a_vertex_change_nothing_but_the_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    condition: Any = PlainCondition(UniformSky(5000.0), ground_luminance_rgb=np.full(3, 3000.0))
+    transport = build_transport_scene(window_room("clear"), condition)
+    means, errors = [], []
+    for connections, first_seed in ((1, 0), (vertex_light.VERTEX_CONNECTIONS, 100)):
+        monkeypatch.setattr(vertex_light, "VERTEX_CONNECTIONS", connections)
+        integrator = PortalIntegrator(transport, camera_rays(room_view(12, 9)), PathOptions(6, 512))
+        values = np.array([integrator.batch(first_seed + k)[:, 1] for k in range(12)])
+        means.append(values.mean(axis=0))
+        errors.append(values.std(axis=0, ddof=1) / np.sqrt(12))
+    uncertainty = np.sqrt((errors[0] ** 2 + errors[1] ** 2).sum()) / means[0].sum()
+    assert errors[1].mean() < errors[0].mean()
+    assert abs(means[1].sum() / means[0].sum() - 1) < SIGMAS * uncertainty + 1e-3
