@@ -138,6 +138,8 @@ void FrameRenderer::draw(Drawing& drawing) {
   centre_share_.resize(std::max(centre_share_.size(), beam_count));
   for (std::size_t b = 0; b < beam_count; ++b) centre_share_[b].resize(height * width);
   is_lit_row_.resize(beam_count * height);
+  is_tested_.assign(beam_count, std::vector<char>(height * width));
+  ends_.assign(beam_count * height, {});
   parallel_indices(height, 1, [&](std::size_t row) {
     for (std::size_t b = 0; b < beam_count; ++b) find_centre_shares(drawing, b, static_cast<int>(row));
   });
@@ -146,8 +148,11 @@ void FrameRenderer::draw(Drawing& drawing) {
     glm::vec3* const sun = &into[row * width];
     if (!drawing.is_begun) std::fill(sun, sun + width, glm::vec3(0));
     for (std::size_t b = 0; b < beam_count; ++b) add_beam(drawing, b, static_cast<int>(row), sun);
-    if (drawing.is_complete) finish(drawing, static_cast<int>(row));
   });
+  if (!drawing.masks)  // stencils have looked at all samples
+    for (std::size_t b = 0; b < beam_count; ++b) follow_ends(drawing, b, into);
+  if (drawing.is_complete)
+    parallel_indices(height, 1, [&](std::size_t row) { finish(drawing, static_cast<int>(row)); });
   drawing.is_begun = true;
 }
 

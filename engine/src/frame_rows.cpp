@@ -5,12 +5,14 @@
 #include <utility>
 
 #include "frame_drawing.h"
+#include "transom/parallel.h"
 
 namespace transom {
 namespace {
 
-constexpr float kSameShare = 0.02f;  // of a beam, between neighbouring pixels without an edge
-constexpr float kSameCurve = 0.9f;   // cosine between normals of neighbouring pixels on one surface
+constexpr float kSameShare = 0.02f;          // of a beam, between neighbouring pixels without an edge
+constexpr float kSameCurve = 0.9f;           // cosine between normals of neighbouring pixels on one surface
+constexpr std::size_t kPixelsFollowed = 16;  // at once
 
 // Whether a point is on the surface of another one, flat or curved.
 bool is_continued(const BeamPoint& a, const BeamPoint& b) {
@@ -62,6 +64,7 @@ void FrameRenderer::add_to_pixels(const Drawing& drawing, std::size_t beam, int 
   const ViewSamples& samples = *samples_;
   const SeenBeam& seen = drawing.beams[beam];
   const int width = samples.view.width, height = samples.view.height, s = samples.edge_samples;
+  const std::size_t first = static_cast<std::size_t>(row) * static_cast<std::size_t>(width);
   const float* const own = centre_shares(beam, row);
   const float* const above = row > 0 ? centre_shares(beam, row - 1) : own;
   const float* const below = row + 1 < height ? centre_shares(beam, row + 1) : own;
@@ -92,22 +95,83 @@ void FrameRenderer::add_to_pixels(const Drawing& drawing, std::size_t beam, int 
         sun[x] += seen.reflected(samples.centre[p], own[x]);
     }
   }
+  test_samples(drawing, beam, scratch.chosen, scratch);
+  for (std::size_t k = 0; k < scratch.chosen.size(); ++k) {
+    const std::size_t p = scratch.chosen[k];
+    const PixelShare share = share_of_pixel(scratch, k);
+    if (share.mean > 0) sun[p - first] += seen.reflected(samples.centre[p], share.mean);
+    if (share.has_end) ends_[beam * static_cast<std::size_t>(height) + static_cast<std::size_t>(row)].push_back(p);
+  }
+}
+
+// Finds what arrives of a beam at all samples of pixels, on the planes of their points.
+void FrameRenderer::test_samples(const Drawing& drawing, std::size_t beam, std::span<const std::size_t> pixels,
+                                 Scratch& scratch) {
+  const SeenBeam& seen = drawing.beams[beam];
   const std::size_t sample_count = places_.size();
   scratch.points.clear();
-  for (const std::size_t p : scratch.chosen) {
+  for (const std::size_t p : pixels) {
     is_edge_[p] = 1;
-    put_on_plane(drawing, samples.centre[p], places_, scratch);
+    is_tested_[beam][p] = 1;
+    put_on_plane(drawing, samples_->centre[p], places_, scratch);
   }
   scratch.shares.resize(scratch.points.size());
   for (std::size_t k = 0; k < scratch.points.size(); k += sample_count)
     seen.find_shares(scratch.points[k].surface, {&scratch.points[k], sample_count}, {&scratch.shares[k], sample_count},
                      scratch.rays);
   seen.trace(scratch.rays);
-  for (std::size_t k = 0; k < scratch.points.size(); k += sample_count) {
-    const float sum = std::accumulate(&scratch.shares[k], &scratch.shares[k] + sample_count, 0.f);
-    if (sum > 0)
-      sun[scratch.points[k].pixel - row * width] +=
-          seen.reflected(scratch.points[k], sum / static_cast<float>(sample_count));
+}
+
+FrameRenderer::PixelShare FrameRenderer::share_of_pixel(const Scratch& scratch, std::size_t k) const {
+  const std::span<const float> shares(&scratch.shares[k * places_.size()], places_.size());
+  const auto [least, most] = std::minmax_element(shares.begin(), shares.end());
+  return {std::accumulate(shares.begin(), shares.end(), 0.f) / static_cast<float>(shares.size()),
+          *most - *least > kSameShare};
+}
+
+// Where light ends in a pixel it goes on ending in one beside it: light or shade narrower than a pixel may pass between
+// the one points of several pixels on its way.
+void FrameRenderer::follow_ends(const Drawing& drawing, std::size_t beam, Picture& sun) {
+  const SeenBeam& seen = drawing.beams[beam];
+  const auto width = static_cast<std::size_t>(samples_->view.width),
+             height = static_cast<std::size_t>(samples_->view.height);
+  std::vector<std::size_t> ends, beside;
+  for (std::size_t y = 0; y < height; ++y) {
+    const std::vector<std::size_t>& of_row = ends_[beam * height + y];
+    ends.insert(ends.end(), of_row.begin(), of_row.end());
+  }
+  const auto visit = [&](std::size_t p) {
+    if (is_tested_[beam][p] || samples_->has_edge[p]) return;
+    const int surface = samples_->centre[p].surface;
+    if (surface < 0 || !seen.may_light(surface)) return;
+    is_tested_[beam][p] = 1;
+    beside.push_back(p);
+  };
+  while (!ends.empty()) {
+    beside.clear();
+    for (const std::size_t p : ends) {
+      const std::size_t x = p % width, y = p / width;
+      for (std::size_t row = y - std::min<std::size_t>(y, 1); row <= std::min(y + 1, height - 1); ++row)
+        for (std::size_t i = x - std::min<std::size_t>(x, 1); i <= std::min(x + 1, width - 1); ++i)
+          visit(row * width + i);
+    }
+    std::vector<char> has_end(beside.size());
+    parallel_ranges(beside.size(), kPixelsFollowed, [&](std::size_t begin, std::size_t end) {
+      thread_local Scratch scratch;
+      test_samples(drawing, beam, {&beside[begin], end - begin}, scratch);
+      for (std::size_t k = begin; k < end; ++k) {
+        const std::size_t p = beside[k];
+        const BeamPoint& point = samples_->centre[p];
+        const PixelShare share = share_of_pixel(scratch, k - begin);
+        const float at_point = centre_shares(beam, static_cast<int>(p / width))[p % width];
+        if (share.mean != at_point)
+          sun[p] = glm::max(sun[p] - seen.reflected(point, at_point), glm::vec3(0)) + seen.reflected(point, share.mean);
+        has_end[k] = share.has_end;
+      }
+    });
+    ends.clear();
+    for (std::size_t k = 0; k < beside.size(); ++k)
+      if (has_end[k]) ends.push_back(beside[k]);
   }
 }
 

@@ -132,6 +132,35 @@ TEST(Frame, RaysFindShadeThinnerThanAPixelWhereverItLies) {
   }
 }
 
+// A slit's light on the floor, oblique in the picture: neither the one point of a pixel nor those of its neighbours
+// need meet it, but it goes on from where they do.
+TEST(Frame, RaysFollowLightNarrowerThanAPixelThatIsObliqueInThePicture) {
+  constexpr double kPixel = 0.02, kWidth = 0.4, kSlitHeight = 3.2;  // [m], [pixels], [m]
+  SceneGeometry scene = roof_light_room(0.5f);
+  const double slit = kPixel * kWidth;
+  test::add_quad(scene, {-1, -1, kSlitHeight}, {2, -1, kSlitHeight}, {2, 5, kSlitHeight}, {-1, 5, kSlitHeight}, 0);
+  test::add_quad(scene, {2 + slit, -1, kSlitHeight}, {5, -1, kSlitHeight}, {5, 5, kSlitHeight},
+                 {2 + slit, 5, kSlitHeight}, 0);
+  const Engine engine(scene, tregenza(), few_rays());
+  Condition condition = uniform_sky(0);
+  condition.beams.push_back({glm::vec3(0, 0, 1), glm::vec3(60000)});
+  const auto light = engine.relight(condition);
+  const double lit = 60000 * 0.5 / std::numbers::pi;
+  View view;
+  view.width = view.height = 32;
+  view.position = {2, 2, 1.5};
+  view.target = {2, 2, 0};
+  view.vertical_fov_rad = 2 * std::atan(0.5 * view.height * kPixel / view.position.z);
+  for (const double slope : {-0.41, -0.27, -0.13, 0.13, 0.27, 0.41}) {  // against the columns, then against the rows
+    const double length = view.height * kWidth * std::sqrt(1 + slope * slope);
+    for (const glm::dvec3& up : {glm::dvec3(slope, 1, 0), glm::dvec3(1, slope, 0)}) {
+      view.up = up;
+      const double found = sum_of_sun(FrameRenderer(engine).render(view, *light, {})) * view.width * view.height / lit;
+      EXPECT_NEAR(found, length, 0.06 * length) << slope << ' ' << up.x;
+    }
+  }
+}
+
 // A slit's light on the floor, 0.4 pixels wide, seen from above: where most of it is in one column or row, a tenth of a
 // pixel may be in the next, beyond the outermost squares of the stencil.
 TEST(Frame, VolumesFindLightBetweenSquaresOfTheStencilWhereverItLies) {

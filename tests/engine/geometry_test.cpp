@@ -72,6 +72,47 @@ TEST(Faces, PaneThatEndsBeforeAFaceDoesNotCutIt) {
   EXPECT_EQ(make_faces(scene).faces.size(), 2u);
 }
 
+// A floor of 6 x 4 m, and faces of a wall across it that stand on it, 1 m high, from and to the given places [m].
+SceneGeometry floor_under_wall(const std::vector<glm::dvec2>& faces) {
+  SceneGeometry scene;
+  scene.materials = {diffuse(0.5f)};
+  add_quad(scene, {0, 0, 0}, {6, 0, 0}, {6, 4, 0}, {0, 4, 0}, 0);
+  for (const glm::dvec2 x : faces) add_quad(scene, {x.x, 1, -0.1}, {x.y, 1, -0.1}, {x.y, 1, 0.9}, {x.x, 1, 0.9}, 0);
+  return scene;
+}
+
+// Areas of the pieces of the first face [m²], least first.
+std::vector<float> areas_of_floor(const SceneGeometry& scene) {
+  std::vector<float> areas;
+  for (const Face& face : make_faces(scene).faces)
+    if (face.source == 0) areas.push_back(face.area);
+  std::sort(areas.begin(), areas.end());
+  return areas;
+}
+
+TEST(Faces, FloorIsCutUnderAWallOfWhichEachFaceCoversLittle) {
+  const std::vector<float> areas = areas_of_floor(floor_under_wall({{0, 1}, {1, 2.5}, {2.5, 4}, {4, 5}, {5, 6}}));
+  ASSERT_EQ(areas.size(), 2u);
+  EXPECT_NEAR(areas[0], 6, 1e-5);
+  EXPECT_NEAR(areas[1], 18, 1e-5);
+}
+
+TEST(Faces, FloorIsCutUnderAWallThatStandsOnSills) {
+  SceneGeometry scene = floor_under_wall({{0, 1}});
+  add_quad(scene, {1, 1, -0.001}, {6, 1, -0.001}, {6, 1, 0.002}, {1, 1, 0.002}, 0);
+  EXPECT_EQ(areas_of_floor(scene).size(), 2u);
+}
+
+TEST(Faces, FacesThatCoverLessThanHalfOfACutTogetherDoNotCut) {
+  EXPECT_EQ(areas_of_floor(floor_under_wall({{0, 1}, {2.5, 4}})).size(), 1u);
+}
+
+TEST(Faces, WhatTwoFacesCoverBothCountsOnce) {
+  SceneGeometry scene = floor_under_wall({{0, 2}});
+  add_quad(scene, {0, 1, -0.8}, {2, 1, -0.8}, {2, 1, 0}, {0, 1, 0}, 0);  // ends on the floor from below
+  EXPECT_EQ(areas_of_floor(scene).size(), 1u);
+}
+
 TEST(Face, ParametersInvertTheBilinearMapOfAnyConvexQuad) {
   SceneGeometry scene;
   scene.materials = {diffuse(0.5f)};

@@ -17,8 +17,9 @@ struct FacePiece {
 };
 
 /// Pieces of all faces, in the order of the faces. A window reveal that passes the plane of its pane is cut there, and
-/// a floor where a wall stands on it: an opaque face is cut by the plane of every opening that it meets, and of every
-/// large face that covers at least half of the cut. extent: size of the scene [m].
+/// a floor where a wall stands on it: an opaque face is cut by the plane of every opening that it meets, and of large
+/// faces in one plane that together cover at least half of the cut, as those around the windows of a wall do. extent:
+/// size of the scene [m].
 std::vector<FacePiece> cut_faces(const SceneGeometry& scene, glm::dvec3 origin, double extent);
 
 }  // namespace transom

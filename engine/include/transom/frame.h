@@ -95,6 +95,14 @@ class FrameRenderer {
   void find_centre_shares(const Drawing& drawing, std::size_t beam, int row);
   void add_beam(const Drawing& drawing, std::size_t beam, int row, glm::vec3* sun);
   void add_to_pixels(const Drawing& drawing, std::size_t beam, int row, Scratch& scratch, glm::vec3* sun);
+  /// Mean share of a beam over the samples of a pixel, and whether its light ends among them.
+  struct PixelShare {
+    float mean;
+    bool has_end;
+  };
+  void test_samples(const Drawing& drawing, std::size_t beam, std::span<const std::size_t> pixels, Scratch& scratch);
+  PixelShare share_of_pixel(const Scratch& scratch, std::size_t k) const;
+  void follow_ends(const Drawing& drawing, std::size_t beam, Picture& sun);
   void add_to_parts(const Drawing& drawing, std::size_t beam, int row, Scratch& scratch, glm::vec3* sun);
   void put_on_plane(const Drawing& drawing, BeamPoint point, std::span<const glm::vec2> places, Scratch& scratch) const;
   void add_to_panes(const Drawing& drawing, std::size_t beam, int row, Scratch& scratch, glm::vec3* sun) const;
@@ -109,6 +117,8 @@ class FrameRenderer {
   std::vector<char> is_lit_row_;                                // by beam and row
   std::vector<float> dark_row_;
   std::vector<char> is_edge_;
+  std::vector<std::vector<char>> is_tested_;    // by beam and pixel: at all its samples
+  std::vector<std::vector<std::size_t>> ends_;  // by beam and row: pixels in which its light ends
   std::unique_ptr<GlContext> context_;
   std::unique_ptr<ShadowVolumes> volumes_;
   std::vector<VolumeGroup> volume_groups_;  // openings of one kind and orientation, as the stencil counts them

@@ -9,7 +9,19 @@ from itertools import pairwise
 
 from transom.daylight.condition import Condition
 from transom.hard.changes import sunlit
-from transom.hard.claims import Case, Claim, Lit, Seen, close, conserving, finite, methods_agree, refused, room_claims
+from transom.hard.claims import (
+    NOISE_SHARE,
+    Case,
+    Claim,
+    Lit,
+    Seen,
+    close,
+    conserving,
+    finite,
+    methods_agree,
+    refused,
+    room_claims,
+)
 from transom.hard.rooms import (
     ROOM_M,
     WINDOW_M,
@@ -66,6 +78,7 @@ def shape_cases() -> list[Case]:
             room.with_polygons(Polygon(((0.5, 2.0, 1.0), (3.5, 2.0, 1.0), (2.0, 2.0001, 1.0)), "wall", "needle")),
         ),
         _solved("T-junctions", t_junction_room()),
+        _terrace(),
         _solved("open sheet", room.with_polygons(_sheet(1.0), _sheet(1.8))),
         _solved("box without a lid", room.with_polygons(*box((1.5, 1.5, 0.2), (2.5, 2.5, 0.7), without=("z1",)))),
         _refused_by_engine(
@@ -117,6 +130,48 @@ def t_junction_room() -> Room:
     ]
     usual = windowed_room()
     return replace(usual, polygons=(*kept, *west, *east, *usual.polygons[5:]))
+
+
+def terrace_room(slab_xs: Sequence[float], slab_ys: Sequence[float]) -> Room:
+    """A room on a slab that goes on around it, in faces between the given lines; its walls stand on it in pieces of
+    which none is half as long as the slab. Two windows reach almost down to it."""
+    x, y, z = ROOM_M
+    roof = [polygon for polygon in shell(without=()) if all(corner[2] == z for corner in polygon.corners)]
+    slab = [
+        quad((x0, y0, 0.0), (x1, y0, 0.0), (x1, y1, 0.0), (x0, y1, 0.0), object="slab")
+        for x0, x1 in pairwise(slab_xs)
+        for y0, y1 in pairwise(slab_ys)
+    ]
+    lines, sill, head = (0.0, 0.6, 1.8, 2.2, 3.4, x), 0.1, 2.5
+    south = [
+        quad((a, 0.0, low), (a, 0.0, high), (b, 0.0, high), (b, 0.0, low), "glass" if is_pane else "wall", "facade")
+        for k, (a, b) in enumerate(pairwise(lines))
+        for low, high, is_pane in ((0.0, sill, False), (sill, head, k % 2 == 1), (head, z, False))
+    ]
+    panes = [replace(face, corners=face.corners[::-1]) for face in south if face.material == "glass"]
+    walls = [face for face in south if face.material == "wall"]
+    walls += [quad((b, y, 0.0), (b, y, z), (a, y, z), (a, y, 0.0)) for a, b in pairwise((0.0, 1.3, 2.7, x))]
+    for a, b in pairwise((0.0, 1.7, 3.4, y)):
+        walls.append(quad((0.0, b, 0.0), (0.0, b, z), (0.0, a, z), (0.0, a, 0.0)))
+        walls.append(quad((x, a, 0.0), (x, a, z), (x, b, z), (x, b, 0.0)))
+    return replace(windowed_room(), polygons=(*roof, *slab, *walls, *panes))
+
+
+def _terrace() -> Case:
+    x, y, _ = ROOM_M
+    xs, ys = (-1.0, x + 1.0), (-2.0, y + 1.0)
+
+    def light(condition: Condition) -> Condition:
+        return sunlit(condition, SUN)
+
+    whole = Lit(terrace_room(xs, ys), light)
+    by_hand = Lit(terrace_room((xs[0], 0.0, x, xs[1]), (ys[0], 0.0, y, ys[1])), light)
+
+    def check() -> Seen:
+        return close(by_hand, whole, NOISE_SHARE)
+
+    claim = Claim("as cut by hand", "the light of a slab in faces that end under the walls, within 3 %", check)
+    return Case("slab that goes on outdoors under walls in pieces", GROUP, (*room_claims(whole), claim))
 
 
 def louvre_room(count: int) -> Room:
