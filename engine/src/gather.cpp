@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "hemisphere.h"
+#include "index_sums.h"
 #include "transom/panels.h"
 #include "transom/sampling.h"
 #include "transom/scene_change.h"
@@ -22,15 +24,11 @@ constexpr float kPi = std::numbers::pi_v<float>;
 
 void merge_shares(std::vector<Share>& shares) {
   const auto is_before = [](const Share& a, const Share& b) { return a.index < b.index; };
-  if (!std::is_sorted(shares.begin(), shares.end(), is_before)) std::sort(shares.begin(), shares.end(), is_before);
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < shares.size(); ++i) {
-    if (kept > 0 && shares[kept - 1].index == shares[i].index)
-      shares[kept - 1].weight += shares[i].weight;
-    else
-      shares[kept++] = shares[i];
-  }
-  shares.resize(kept);
+  if (std::adjacent_find(shares.begin(), shares.end(), std::not_fn(is_before)) == shares.end()) return;
+  thread_local IndexSums<float> sums;
+  for (const Share& share : shares) sums.add(share.index, share.weight);
+  shares.clear();
+  sums.take([&](int index, float weight) { shares.push_back({index, weight}); });
 }
 
 Gatherer::Gatherer(const LightMesh& mesh, const RayScene& rays, const std::vector<Material>& materials,
@@ -71,25 +69,51 @@ GatherRow Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std:
   return std::move(tally).row(count, mesh_.faces().extent);
 }
 
+// The same from one point: directions are made and rays cast sixteen at once.
+GatherRow Gatherer::gather_from_point(const Node& point, int count, std::uint32_t seed, Elements told) const {
+  const SobolSequence points(seed);
+  const glm::mat3 frame = frame_from_normal(point.normal);
+  HemisphereTally tally;
+  tally.slots.reserve(static_cast<std::size_t>(count));
+  std::uint32_t indices[kPointsAtOnce];
+  Directions directions;
+  Hit hits[kPointsAtOnce];
+  auto next = coherent_order(count).begin();
+  for (int begin = 0; begin < count; begin += static_cast<int>(kPointsAtOnce)) {
+    const std::size_t size = std::min(kPointsAtOnce, static_cast<std::size_t>(count - begin));
+    for (std::size_t i = 0; i < size; ++i) {
+      while (*next >= static_cast<std::uint32_t>(count)) ++next;
+      indices[i] = *next++;
+    }
+    sample_hemisphere(points, {indices, size}, frame, directions);
+    rays_.intersect_from(point.position, directions.x, directions.y, directions.z, RayScene::What::kAll, {hits, size});
+    for (std::size_t i = 0; i < size; ++i)
+      add_hit(hits[i], {directions.x[i], directions.y[i], directions.z[i]}, told, tally);
+  }
+  return std::move(tally).row(count, mesh_.faces().extent);
+}
+
 // Casts rays and counts what they meet.
 void Gatherer::add_hits(std::span<const Ray> rays, Elements told, HemisphereTally& tally) const {
   Hit hits[kBlock];
   for (std::size_t begin = 0; begin < rays.size(); begin += kBlock) {
     const std::span<const Ray> block = rays.subspan(begin, std::min<std::size_t>(kBlock, rays.size() - begin));
     rays_.intersect(RayScene::What::kAll, block, {hits, block.size()}, RayScene::Order::kCoherent);
-    for (std::size_t i = 0; i < block.size(); ++i) {
-      if (hits[i].face < 0) {
-        tally.bins.push_back(sky_(block[i].direction));
-      } else if (mesh_.faces().is_inside_solid(hits[i].face, hits[i].side)) {
-        ++tally.buried;
-      } else {
-        const int slot = mesh_.slot_at(hits[i]);
-        tally.slots.push_back(slot);
-        const float near = told == Elements::kNone ? 0 : near_distance_[static_cast<std::size_t>(slot)];
-        if (hits[i].t < near || (told == Elements::kAll && near > 0)) tally.near.push_back(mesh_.element_at(hits[i]));
-        tally.add_distance(hits[i].t, mesh_.faces());
-      }
-    }
+    for (std::size_t i = 0; i < block.size(); ++i) add_hit(hits[i], block[i].direction, told, tally);
+  }
+}
+
+void Gatherer::add_hit(const Hit& hit, glm::vec3 direction, Elements told, HemisphereTally& tally) const {
+  if (hit.face < 0) {
+    tally.bins.push_back(sky_(direction));
+  } else if (mesh_.faces().is_inside_solid(hit.face, hit.side)) {
+    ++tally.buried;
+  } else {
+    const int slot = mesh_.slot_at(hit);
+    tally.slots.push_back(slot);
+    const float near = told == Elements::kNone ? 0 : near_distance_[static_cast<std::size_t>(slot)];
+    if (hit.t < near || (told == Elements::kAll && near > 0)) tally.near.push_back(mesh_.element_at(hit));
+    tally.add_distance(hit.t, mesh_.faces());
   }
 }
 
@@ -180,17 +204,15 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
   // Beyond the opening: an obstruction, the sky or the ground. Further openings on the way take their share.
   const float offset = mesh_.faces().ray_offset();
   for (Ray& ray : segments) {
-    ray.t_near = ray.t_far;
+    ray.t_near = ray.t_far + 2 * offset;
     ray.t_far = Ray::kInfinity;
   }
   std::vector<Hit> hits(kept);
-  rays_.intersect(RayScene::What::kOpaque, segments, hits, RayScene::Order::kCoherent);
-  for (std::size_t i = 0; i < kept; ++i)
-    if (hits[i].face >= 0) segments[i].t_far = hits[i].t - offset;
-  std::vector<float> transmitted(kept);
-  rays_.transmittance(segments, transmitted);
+  rays_.intersect(RayScene::What::kAll, segments, hits, RayScene::Order::kCoherent);
+  const std::vector<float> transmitted = past_further_openings(segments, hits);
   for (std::size_t i = 0; i < kept; ++i) {
-    const float weight = scale * candidates[i].weight * transmitted[i];
+    const float weight = scale * candidates[i].weight * transmitted[i] *
+                         rays_.opening_transmittance(candidates[i].face, segments[i].direction);
     if (weight <= 0) continue;
     if (hits[i].face < 0)
       row.sky.push_back({sky_(segments[i].direction), weight});
@@ -199,9 +221,35 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
   }
 }
 
+// Where rays have met an opening they go on to what is opaque: their hits are then that. Returns the share that the
+// openings between pass.
+std::vector<float> Gatherer::past_further_openings(std::span<const Ray> rays, std::vector<Hit>& hits) const {
+  std::vector<float> shares(rays.size(), 1.f);
+  std::vector<Ray> onward;
+  std::vector<std::size_t> index;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (hits[i].face < 0 ||
+        materials_[mesh_.faces().faces[static_cast<std::size_t>(hits[i].face)].material].opening < 0)
+      continue;
+    onward.push_back(rays[i]);
+    index.push_back(i);
+  }
+  if (onward.empty()) return shares;
+  std::vector<Hit> met(onward.size());
+  rays_.intersect(RayScene::What::kOpaque, onward, met, RayScene::Order::kCoherent);
+  for (std::size_t k = 0; k < onward.size(); ++k)
+    if (met[k].face >= 0) onward[k].t_far = met[k].t - mesh_.faces().ray_offset();
+  std::vector<float> passed(onward.size());
+  rays_.transmittance(onward, passed);
+  for (std::size_t k = 0; k < onward.size(); ++k) {
+    hits[index[k]] = met[k];
+    shares[index[k]] = passed[k];
+  }
+  return shares;
+}
+
 GatherRow Gatherer::surroundings_of_point(const Node& point, GatherSamples samples, std::uint32_t seed) const {
-  const auto origin_of = [&](glm::vec2) { return Origin{point.position, point.normal}; };
-  return gather_hemisphere(origin_of, samples.hemisphere, seed, Elements::kNear);
+  return gather_from_point(point, samples.hemisphere, seed, Elements::kNear);
 }
 
 void Gatherer::look_through_openings(const Node& point, GatherSamples samples, std::uint32_t seed,
@@ -231,6 +279,32 @@ void Gatherer::look_through_openings(int slot, GatherSamples samples, std::uint3
   merge_shares(row.sky);
 }
 
+// The rays of those points of a sequence that are below `count`.
+template <typename OriginOf>
+void Gatherer::add_rays(const OriginOf& origin_of, const SobolSequence& points, std::span<const std::uint32_t> indices,
+                        int count, std::vector<Ray>& rays) {
+  for (const std::uint32_t index : indices) {
+    if (index >= static_cast<std::uint32_t>(count)) continue;
+    const glm::vec4 u = points.point4(index);
+    const Origin origin = origin_of(glm::vec2(u.z, u.w));
+    rays.push_back({origin.position, frame_from_normal(origin.normal) * sample_cosine_hemisphere({u.x, u.y})});
+  }
+}
+
+// The same from a point, as gather_from_point casts them.
+void Gatherer::add_rays_from_point(const Node& point, const SobolSequence& points,
+                                   std::span<const std::uint32_t> indices, int count, std::vector<Ray>& rays) {
+  const glm::mat3 frame = frame_from_normal(point.normal);
+  Directions directions;
+  for (std::size_t begin = 0; begin < indices.size(); begin += kPointsAtOnce) {
+    const auto block = indices.subspan(begin, std::min(kPointsAtOnce, indices.size() - begin));
+    sample_hemisphere(points, block, frame, directions);
+    for (std::size_t k = 0; k < block.size(); ++k)
+      if (block[k] < static_cast<std::uint32_t>(count))
+        rays.push_back({point.position, {directions.x[k], directions.y[k], directions.z[k]}});
+  }
+}
+
 // Casts those rays again that may meet what has changed, in both states. False: their answers do not go together.
 template <typename OriginOf>
 bool Gatherer::gather_again(const OriginOf& origin_of, const Node& middle, float radius, int count, std::uint32_t seed,
@@ -250,15 +324,13 @@ bool Gatherer::gather_again(const OriginOf& origin_of, const Node& middle, float
   for (std::size_t begin = 0; begin < order.size(); begin += per_cell) {
     const glm::ivec2 cell = points.cell2(order[begin], cells.bits());
     if (!is_met[cell.y * cells.per_axis() + cell.x]) continue;
-    for (std::size_t k = begin; k < begin + per_cell; ++k) {
-      if (order[k] >= static_cast<std::uint32_t>(count)) continue;
-      // A point needs no place on it.
-      const glm::vec4 u = radius > 0 ? points.point4(order[k]) : glm::vec4(points.point2(order[k]), 0, 0);
-      const Origin origin = origin_of(glm::vec2(u.z, u.w));
-      const Ray ray{origin.position, frame_from_normal(origin.normal) * sample_cosine_hemisphere({u.x, u.y})};
-      if (change.may_meet(ray)) rays.push_back(ray);
-    }
+    const std::span<const std::uint32_t> cell_order{&order[begin], per_cell};
+    if (radius > 0)
+      add_rays(origin_of, points, cell_order, count, rays);
+    else
+      add_rays_from_point(middle, points, cell_order, count, rays);
   }
+  std::erase_if(rays, [&](const Ray& ray) { return !change.may_meet(ray); });
   if (rays.empty()) return true;
   HemisphereTally lost, found;
   before.add_hits(rays, told, lost);
@@ -320,8 +392,7 @@ bool Gatherer::may_see_through_openings(int slot, const SceneChange& change) con
 }
 
 GatherRow Gatherer::gather_at_point(const Node& point, GatherSamples samples, std::uint32_t seed) const {
-  const auto origin_of = [&](glm::vec2) { return Origin{point.position, point.normal}; };
-  GatherRow row = gather_hemisphere(origin_of, samples.hemisphere, seed, Elements::kAll);
+  GatherRow row = gather_from_point(point, samples.hemisphere, seed, Elements::kAll);
   look_through_openings(point, samples, seed, row);
   return row;
 }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "index_sums.h"
+
 namespace transom {
 namespace {
 
@@ -11,14 +13,12 @@ constexpr float kPi = std::numbers::pi_v<float>;
 constexpr double kInverseSteps = 1 << 20;  // of the inverse distance, for the inverse of the scene's extent
 
 // Shares of `unit` for each ray.
-std::vector<Share> count_up(std::vector<int>& indices, float unit) {
-  std::sort(indices.begin(), indices.end());
+std::vector<Share> count_up(const std::vector<int>& indices, float unit) {
+  thread_local IndexSums<int> counts;
+  for (const int index : indices) counts.add(index, 1);
   std::vector<Share> shares;
-  for (auto first = indices.begin(); first != indices.end();) {
-    const auto last = std::find_if(first, indices.end(), [&](int index) { return index != *first; });
-    shares.push_back({*first, unit * static_cast<float>(last - first)});
-    first = last;
-  }
+  shares.reserve(counts.distinct());
+  counts.take([&](int index, int count) { shares.push_back({index, unit * static_cast<float>(count)}); });
   return shares;
 }
 

@@ -24,6 +24,7 @@ PointLinks::PointLinks(const LightMesh& mesh, const RayScene& rays, const std::v
       rays_(rays),
       point_count_(points.size()),
       neighbours_(std::move(neighbours)),
+      openings_(mesh.faces(), rays.faces_of(RayScene::What::kOpenings), points, kBlock),
       links_(static_cast<std::size_t>(mesh.slot_count())) {
   const std::size_t padded = (points.size() + kBlock - 1) / kBlock * kBlock;
   for (std::vector<float>* list : {&x_, &y_, &z_, &nx_, &ny_, &nz_}) list->assign(padded, 0.f);
@@ -144,23 +145,24 @@ std::shared_ptr<const PointLinks::Link> PointLinks::known_link(int slot, const E
 }
 
 // Shares of light that arrive at the end of segments: 0 behind something opaque, else the transmittance on the way.
-// is_glazed: whether there are openings on the way.
-void PointLinks::seen_shares(std::vector<Ray> segments, RayScene::Order order, std::vector<float>& shares,
+// may_be_glazed: whether openings may be on the way; is_glazed: whether they are, and nothing opaque.
+void PointLinks::seen_shares(std::vector<Ray> segments, const std::vector<std::uint8_t>& may_be_glazed,
+                             RayScene::Order order, std::vector<float>& shares,
                              std::vector<std::uint8_t>& is_glazed) const {
   for (Ray& segment : segments) segment.origin += mesh_.faces().ray_offset() * kAside;
   std::vector<std::uint8_t> is_stopped(segments.size());
   rays_.occluded(RayScene::What::kOpaque, segments, is_stopped, order);
   shares.resize(segments.size());
-  for (std::size_t k = 0; k < segments.size(); ++k) shares[k] = is_stopped[k] ? 0.f : 1.f;
   is_glazed.assign(segments.size(), 0);
-  if (!rays_.has_openings()) return;
   std::vector<Ray> open;
   std::vector<std::size_t> index;
-  for (std::size_t k = 0; k < segments.size(); ++k)
-    if (!is_stopped[k]) {
-      open.push_back(segments[k]);
-      index.push_back(k);
-    }
+  for (std::size_t k = 0; k < segments.size(); ++k) {
+    shares[k] = is_stopped[k] ? 0.f : 1.f;
+    if (is_stopped[k] || !may_be_glazed[k]) continue;
+    open.push_back(segments[k]);
+    index.push_back(k);
+  }
+  if (open.empty()) return;
   std::vector<std::uint8_t> meets_opening(open.size());
   rays_.occluded(RayScene::What::kOpenings, open, meets_opening, order);
   std::size_t kept = 0;
@@ -183,21 +185,23 @@ PointLinks::MiddleView PointLinks::middle_view(int slot, Exposed exposed, const 
   const glm::vec3 middle = view.exposed.middle, normal = mesh_.normal_of(slot);
   const float size2 = 2 * mesh_.slot_area(slot), size = std::sqrt(size2);
   std::vector<int> far_points;
-  std::vector<float> height(kBlock), distance2(kBlock), cosine(kBlock);
+  enum Place : std::uint8_t { kBehind, kNear, kFar };
+  std::uint8_t place[kBlock];
   for (std::size_t begin = 0; begin < x_.size(); begin += kBlock) {
-    bool any = false;
+    std::uint8_t any = kBehind;
     for (std::size_t k = 0; k < kBlock; ++k) {
       const float dx = middle.x - x_[begin + k], dy = middle.y - y_[begin + k], dz = middle.z - z_[begin + k];
-      height[k] = -(dx * normal.x + dy * normal.y + dz * normal.z);
-      cosine[k] = dx * nx_[begin + k] + dy * ny_[begin + k] + dz * nz_[begin + k];
-      distance2[k] = dx * dx + dy * dy + dz * dz;
-      any |= height[k] > 0 && cosine[k] > -size;
+      const float height = -(dx * normal.x + dy * normal.y + dz * normal.z);
+      const float cosine = dx * nx_[begin + k] + dy * ny_[begin + k] + dz * nz_[begin + k];
+      const float distance2 = dx * dx + dy * dy + dz * dz;
+      const bool is_in_front = (height > 0) & (cosine > -size), is_far = distance2 > kFarPatch * kFarPatch * size2;
+      place[k] = is_in_front ? (is_far ? kFar : kNear) : kBehind;
+      any |= place[k];
     }
-    if (!any) continue;
+    if (any == kBehind) continue;
     for (std::size_t k = 0; k < kBlock && begin + k < point_count_; ++k) {
       const int point = static_cast<int>(begin + k);
-      if (height[k] > 0 && cosine[k] > -size && gets_light(point))
-        (distance2[k] > kFarPatch * kFarPatch * size2 ? far_points : view.near_point).push_back(point);
+      if (place[k] != kBehind && gets_light(point)) (place[k] == kFar ? far_points : view.near_point).push_back(point);
     }
   }
   see_middle(view, far_points, KnownPoints(known, view.before.get()));
@@ -227,12 +231,18 @@ void PointLinks::link_near(Link& link, int slot, const KnownPoints& known) const
   for (std::size_t e = 0; e < element_count; ++e)
     shapes.push_back(element_shape(mesh_, slot * mesh_.elements_per_slot() + static_cast<int>(e)));
   std::vector<Ray> segments;
+  std::vector<std::uint8_t> may_be_glazed, is_glazed;
   std::vector<float> weights, shares;
   std::vector<std::size_t> unknown;  // places in `weights` that a segment each speaks for
   std::vector<int> kept;
   const glm::vec3 middle = mesh_.middle_of(slot).position;
   float radius = 0;
-  for (const ElementShape& shape : shapes) radius = std::max(radius, glm::length(shape.middle - middle));
+  std::vector<glm::vec3> middles;
+  for (const ElementShape& shape : shapes) {
+    radius = std::max(radius, glm::length(shape.middle - middle));
+    middles.push_back(shape.middle);
+  }
+  MayBeGlazed may_glaze(*this, middles);
   for (const int i : link.near_point) {
     const int known_point = known.number(i);
     const float* before = known_point >= 0 ? known.link->near_weight_of(known_point, element_count) : nullptr;
@@ -256,10 +266,10 @@ void PointLinks::link_near(Link& link, int slot, const KnownPoints& known) const
     for (std::size_t e = 0; e < element_count; ++e) {
       unknown.push_back(weights.size() - element_count + e);
       segments.push_back({point, shapes[e].middle - point, 0, 1});
+      may_be_glazed.push_back(may_glaze(i));
     }
   }
-  std::vector<std::uint8_t> is_glazed;
-  seen_shares(std::move(segments), RayScene::Order::kCoherent, shares, is_glazed);
+  seen_shares(std::move(segments), may_be_glazed, RayScene::Order::kCoherent, shares, is_glazed);
   for (std::size_t k = 0; k < unknown.size(); ++k) {
     weights[unknown[k]] *= shares[k];
     if (is_glazed[k]) link.glazed_point.push_back(kept[unknown[k] / element_count]);

@@ -9,6 +9,7 @@ namespace transom {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
+constexpr std::uint8_t kAllSeen = 255;  // as a stored share
 constexpr std::size_t kFirstAsked = 4;  // elements; where these are seen as the middle is, so are the others
 constexpr float kLeastAsked = 4e-4f;    // share of what a point sees: of a patch that has less, the middle says enough
 
@@ -16,7 +17,7 @@ constexpr float kLeastAsked = 4e-4f;    // share of what a point sees: of a patc
 enum class Between : std::uint8_t { kSolid, kGlass, kNothing };
 
 Between between(std::uint8_t seen) {
-  return seen == 0 ? Between::kSolid : seen == 255 ? Between::kNothing : Between::kGlass;
+  return seen == 0 ? Between::kSolid : seen == kAllSeen ? Between::kNothing : Between::kGlass;
 }
 
 }  // namespace
@@ -25,6 +26,8 @@ void PointLinks::see_middle(MiddleView& view, const std::vector<int>& far_points
   const glm::vec3 middle = view.exposed.middle;
   std::vector<Ray> segments;
   std::vector<int> unknown;
+  std::vector<std::uint8_t> may_be_glazed, is_glazed;
+  MayBeGlazed may_glaze(*this, {&middle, 1});
   std::size_t entered = block_middle_.size();
   bool is_block_met = false;  // whether what has changed may stand between the patch and some point of the block
   for (const int point : far_points) {
@@ -44,12 +47,12 @@ void PointLinks::see_middle(MiddleView& view, const std::vector<int>& far_points
     }
     unknown.push_back(point);
     segments.push_back(segment);
+    may_be_glazed.push_back(may_glaze(point));
   }
   std::vector<float> shares;
-  std::vector<std::uint8_t> is_glazed;
-  seen_shares(std::move(segments), RayScene::Order::kCoherent, shares, is_glazed);
+  seen_shares(std::move(segments), may_be_glazed, RayScene::Order::kCoherent, shares, is_glazed);
   for (std::size_t k = 0; k < unknown.size(); ++k) {
-    view.seen[static_cast<std::size_t>(unknown[k])] = stored_share(shares[k]);
+    view.seen[static_cast<std::size_t>(unknown[k])] = shares[k] == 1 ? kAllSeen : stored_share(shares[k]);
     if (is_glazed[k]) view.glazed_point.push_back(unknown[k]);
   }
 }
@@ -64,7 +67,7 @@ class PointLinks::ElementViews {
   const std::vector<char>& is_asked() const { return is_asked_; }
 
  private:
-  bool may_ask(int point) const;
+  void find_who_may_ask();
   bool is_at_an_edge(int point, const std::vector<const MiddleView*>& beside) const;
   void ask(const std::vector<int>& points);
   std::vector<int> not_known(const std::vector<int>& points);
@@ -77,14 +80,17 @@ class PointLinks::ElementViews {
   const MiddleView& view_;
   const KnownPoints& known_;
   Link& link_;
-  float weight_ = 0;            // share of what a point sees, per point_weight
-  glm::vec3 normal_{0};         // of the patch
-  std::vector<char> is_asked_;  // by point
+  std::vector<char> may_ask_, is_asked_;  // by point
 };
 
-bool PointLinks::ElementViews::may_ask(int point) const {
-  const auto i = static_cast<std::size_t>(point);
-  return view_.seen[i] != kNotFar && weight_ * links_.point_weight(view_.exposed.middle, normal_, i) >= kLeastAsked;
+// Far points for which the patch is more than very little of what they see.
+void PointLinks::ElementViews::find_who_may_ask() {
+  const float weight = links_.mesh_.slot_area(view_.slot) / kPi;  // share of what a point sees, per point_weight
+  const glm::vec3 middle = view_.exposed.middle, normal = links_.mesh_.normal_of(view_.slot);
+  std::vector<float> share(view_.seen.size());
+  for (std::size_t i = 0; i < share.size(); ++i) share[i] = weight * links_.point_weight(middle, normal, i);
+  may_ask_.resize(share.size());
+  for (std::size_t i = 0; i < share.size(); ++i) may_ask_[i] = view_.seen[i] != kNotFar && share[i] >= kLeastAsked;
 }
 
 // Whether a point beside this one sees the middle otherwise, or this one the middle of a patch beside.
@@ -103,11 +109,10 @@ bool PointLinks::ElementViews::is_at_an_edge(int point, const std::vector<const 
 // What hides a part of the patch is followed from point to point.
 void PointLinks::ElementViews::find(const std::vector<const MiddleView*>& beside) {
   if (view_.exposed.elements.size() < 2 || links_.neighbours_.begin.empty()) return;
-  weight_ = links_.mesh_.slot_area(view_.slot) / kPi;
-  normal_ = links_.mesh_.normal_of(view_.slot);
+  find_who_may_ask();
   std::vector<int> next;
   for (int point = 0; point < static_cast<int>(links_.point_count_); ++point)
-    if (may_ask(point) && is_at_an_edge(point, beside)) next.push_back(point);
+    if (may_ask_[static_cast<std::size_t>(point)] && is_at_an_edge(point, beside)) next.push_back(point);
   while (!next.empty()) {
     for (const int point : next) is_asked_[static_cast<std::size_t>(point)] = 1;
     const std::size_t first = link_.partial.size();
@@ -116,7 +121,7 @@ void PointLinks::ElementViews::find(const std::vector<const MiddleView*>& beside
     for (std::size_t k = first; k < link_.partial.size(); ++k)
       for (const int other : links_.neighbours_.of(static_cast<std::size_t>(link_.partial[k].point))) {
         char& is_asked = is_asked_[static_cast<std::size_t>(other)];
-        if (is_asked || !may_ask(other)) continue;
+        if (is_asked || !may_ask_[static_cast<std::size_t>(other)]) continue;
         is_asked = 1;
         next.push_back(other);
       }
@@ -154,20 +159,25 @@ void PointLinks::ElementViews::ask(const std::vector<int>& points) {
   std::vector<Answer> answers;
   for (const int point : not_known(points)) answers.push_back({point});
   const std::vector<int>& elements = view_.exposed.elements;
+  std::vector<glm::vec3> places;
+  for (const int element : elements) places.emplace_back(link_.element[static_cast<std::size_t>(element)]);
+  MayBeGlazed may_glaze(links_, places);
   std::vector<Ray> segments;
   std::vector<float> shares;
-  std::vector<std::uint8_t> is_glazed;
+  std::vector<std::uint8_t> may_be_glazed, is_glazed;
   for (std::size_t first = 0; first < elements.size();) {
     const std::size_t last = first == 0 ? std::min(kFirstAsked, elements.size()) : elements.size();
     segments.clear();
+    may_be_glazed.clear();
     for (const Answer& answer : answers)
       for (std::size_t e = first; e < last; ++e) {
-        const glm::vec3 from = place(answer.point), to(link_.element[static_cast<std::size_t>(elements[e])]);
-        segments.push_back({from, to - from, 0, 1});
+        const glm::vec3 from = place(answer.point);
+        segments.push_back({from, places[e] - from, 0, 1});
+        may_be_glazed.push_back(may_glaze(answer.point));
       }
     // Rays along an edge that a patch and an object have in common meet it or not by the rays beside them if these are
     // traced as coherent; an edit casts fewer.
-    links_.seen_shares(segments, RayScene::Order::kScattered, shares, is_glazed);
+    links_.seen_shares(segments, may_be_glazed, RayScene::Order::kScattered, shares, is_glazed);
     std::size_t segment = 0;
     for (Answer& answer : answers) {
       const Between middle = between(view_.seen[static_cast<std::size_t>(answer.point)]);
@@ -229,9 +239,11 @@ void PointLinks::weigh_far(Link& link, int slot) const {
     return seen_area / kPi * seen_share(seen) * point_weight(centroid, normal, point);
   };
   std::vector<float> weight(link.seen.size());
-  for (std::size_t k = 0; k < weight.size(); ++k)
-    if (link.seen[k] > 0)
-      weight[k] = weight_of(area, link.seen[k], static_cast<std::size_t>(link.block[k / kBlock]) * kBlock + k % kBlock);
+  for (std::size_t b = 0; b < link.block.size(); ++b) {
+    const std::size_t first = static_cast<std::size_t>(link.block[b]) * kBlock;
+    for (std::size_t k = 0; k < kBlock; ++k)
+      weight[b * kBlock + k] = weight_of(area, link.seen[b * kBlock + k], first + k);
+  }
   std::size_t block = 0;
   for (const Partial& partial : link.partial) {
     const auto point = static_cast<std::size_t>(partial.point);
@@ -244,8 +256,9 @@ void PointLinks::weigh_far(Link& link, int slot) const {
   const float most = weight.empty() ? 0.f : *std::max_element(weight.begin(), weight.end());
   if (!(most > 0)) return;
   link.weight_unit = most / std::numeric_limits<std::uint16_t>::max();
-  for (const float value : weight)
-    link.weight.push_back(static_cast<std::uint16_t>(std::lround(value / link.weight_unit)));
+  link.weight.resize(weight.size());
+  for (std::size_t k = 0; k < weight.size(); ++k)
+    link.weight[k] = static_cast<std::uint16_t>(weight[k] / link.weight_unit + 0.5f);
 }
 
 }  // namespace transom

@@ -205,6 +205,12 @@ RayScene::RayScene(const Faces& faces, const std::vector<Material>& materials,
 
 RayScene::~RayScene() = default;
 
+std::vector<int> RayScene::faces_of(What what) const {
+  std::vector<int> faces = trees_[static_cast<std::size_t>(what)]->face_of_triangle;  // both triangles of a quad
+  faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
+  return faces;
+}
+
 void RayScene::intersect(What what, std::span<const Ray> rays, std::span<Hit> hits, Order order) const {
   const Tree& tree = *trees_[static_cast<std::size_t>(what)];
   alignas(64) int valid[kWidth];

@@ -86,8 +86,20 @@ std::uint32_t scrambled(std::uint32_t index, int dimension, std::uint32_t seed) 
   return owen_scramble(plain, seed);
 }
 
+float in_unit_interval(std::uint32_t x) {
+  return std::min(static_cast<float>(x) * 0x1p-32f, 0x1.fffffep-1f);
+}
+
 float coordinate(std::uint32_t index, int dimension, std::uint32_t seed) {
-  return std::min(static_cast<float>(scrambled(index, dimension, seed)) * 0x1p-32f, 0x1.fffffep-1f);
+  return in_unit_interval(scrambled(index, dimension, seed));
+}
+
+// Sine and cosine of an angle up to a quarter of pi either way, to the last digit or so, without a branch
+// [Moshier 1992, Cephes: sinf, cosf].
+void small_sine_and_cosine(float angle, float& sine, float& cosine) {
+  const float z = angle * angle;
+  sine = ((-1.9515295891e-4f * z + 8.3321608736e-3f) * z - 1.6666654611e-1f) * z * angle + angle;
+  cosine = ((2.443315711809948e-5f * z - 1.388731625493765e-3f) * z + 4.166664568298827e-2f) * z * z - 0.5f * z + 1;
 }
 
 }  // namespace
@@ -108,6 +120,16 @@ glm::vec2 SobolSequence::point2(std::uint32_t index) const {
 glm::vec4 SobolSequence::point4(std::uint32_t index) const {
   return {coordinate(index, 0, seeds_[0]), coordinate(index, 1, seeds_[1]), coordinate(index, 2, seeds_[2]),
           coordinate(index, 3, seeds_[3])};
+}
+
+void SobolSequence::points2(const std::uint32_t (&indices)[kPointsAtOnce], float (&x)[kPointsAtOnce],
+                            float (&y)[kPointsAtOnce]) const {
+  std::uint32_t plain[2][kPointsAtOnce];
+  for (std::size_t k = 0; k < kPointsAtOnce; ++k)
+    for (int d = 0; d < 2; ++d)
+      plain[d][k] = indices[k] < kTabulated ? kTable[indices[k]][d] : plain_coordinate(indices[k], d);
+  for (std::size_t k = 0; k < kPointsAtOnce; ++k) x[k] = in_unit_interval(owen_scramble(plain[0][k], seeds_[0]));
+  for (std::size_t k = 0; k < kPointsAtOnce; ++k) y[k] = in_unit_interval(owen_scramble(plain[1][k], seeds_[1]));
 }
 
 glm::ivec2 SobolSequence::cell2(std::uint32_t index, int bits) const {
@@ -155,6 +177,29 @@ glm::vec2 sample_disc(glm::vec2 u) {
   return p.y * glm::vec2(std::sin(phi), std::cos(phi));
 }
 
+// All are found, whatever the number of those asked for: one loop of known length, without branches. The disc is that
+// of sample_disc.
+void sample_hemisphere(const SobolSequence& points, std::span<const std::uint32_t> indices, const glm::mat3& frame,
+                       Directions& directions) {
+  constexpr float kQuarterPi = std::numbers::pi_v<float> / 4;
+  std::uint32_t padded[kPointsAtOnce] = {};
+  std::copy(indices.begin(), indices.end(), padded);
+  float u[kPointsAtOnce], v[kPointsAtOnce];
+  points.points2(padded, u, v);
+  for (std::size_t k = 0; k < kPointsAtOnce; ++k) {
+    const float px = 2 * u[k] - 1, py = 2 * v[k] - 1;
+    const bool is_wide = std::abs(px) > std::abs(py);
+    const float longer = is_wide ? px : py, shorter = is_wide ? py : px;
+    float sine, cosine;
+    small_sine_and_cosine(longer == 0 ? 0.f : kQuarterPi * (shorter / longer), sine, cosine);
+    const float x = longer * (is_wide ? cosine : sine), y = longer * (is_wide ? sine : cosine);
+    const float z = std::sqrt(std::max(0.f, 1 - x * x - y * y));
+    directions.x[k] = frame[0].x * x + frame[1].x * y + frame[2].x * z;
+    directions.y[k] = frame[0].y * x + frame[1].y * y + frame[2].y * z;
+    directions.z[k] = frame[0].z * x + frame[1].z * y + frame[2].z * z;
+  }
+}
+
 glm::vec3 sample_cosine_hemisphere(glm::vec2 u) {
   const glm::vec2 d = sample_disc(u);
   return {d, std::sqrt(std::max(0.f, 1 - glm::dot(d, d)))};
@@ -172,13 +217,16 @@ glm::vec2 sample_triangle(glm::vec2 u) {
   return {root * (1 - u.y), root * u.y};
 }
 
-SphericalTriangle::SphericalTriangle(glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) : a_(a), b_(b), c_(c) {
+SphericalTriangle::SphericalTriangle(glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) : a_(a), b_(b) {
   const glm::dvec3 ab = glm::cross(a, b), bc = glm::cross(b, c), ca = glm::cross(c, a);
   if (glm::dot(ab, ab) == 0 || glm::dot(bc, bc) == 0 || glm::dot(ca, ca) == 0) return;
   const auto angle = [](glm::dvec3 u, glm::dvec3 v) {
     return std::atan2(glm::length(glm::cross(u, v)), glm::dot(u, v));
   };
   alpha_ = angle(ab, -ca);
+  sin_alpha_ = std::sin(alpha_);
+  cos_alpha_ = std::cos(alpha_);
+  towards_c_ = glm::normalize(c - glm::dot(c, a) * a);
   const double beta = angle(bc, -ab), gamma = angle(ca, -bc);
   solid_angle_ = std::max(0.0, alpha_ + beta + gamma - std::numbers::pi);
   cos_c_ = glm::dot(a, b);
@@ -188,12 +236,10 @@ glm::dvec3 SphericalTriangle::sample(glm::dvec2 u) const {
   // Sub-triangle with corner a, side towards b, and u.x of the area; then a point on the arc to its third corner.
   const double area = u.x * solid_angle_;
   const double s = std::sin(area - alpha_), t = std::cos(area - alpha_);
-  const double cos_alpha = std::cos(alpha_), sin_alpha = std::sin(alpha_);
-  const double p = t - cos_alpha, q = s + sin_alpha * cos_c_;
-  const double denominator = (q * s + p * t) * sin_alpha;
-  const double k = denominator == 0 ? 1.0 : std::clamp(((q * t - p * s) * cos_alpha - q) / denominator, -1.0, 1.0);
-  const glm::dvec3 towards_c = glm::normalize(c_ - glm::dot(c_, a_) * a_);
-  const glm::dvec3 third = k * a_ + std::sqrt(1 - k * k) * towards_c;
+  const double p = t - cos_alpha_, q = s + sin_alpha_ * cos_c_;
+  const double denominator = (q * s + p * t) * sin_alpha_;
+  const double k = denominator == 0 ? 1.0 : std::clamp(((q * t - p * s) * cos_alpha_ - q) / denominator, -1.0, 1.0);
+  const glm::dvec3 third = k * a_ + std::sqrt(1 - k * k) * towards_c_;
   const double z = 1 - u.y * (1 - glm::dot(third, b_));
   const glm::dvec3 across = third - glm::dot(third, b_) * b_;
   const double length = glm::length(across);

@@ -44,6 +44,26 @@ TEST(Hemisphere, CosineSamplesHaveMeanCosineTwoThirds) {
   EXPECT_NEAR(sum / kCount, 2.0 / 3, 1e-3);
 }
 
+TEST(Hemisphere, SixteenDirectionsAtOnceAreThoseOfTheirPointsWhateverTheirNumber) {
+  const SobolSequence points(9);
+  const glm::mat3 frame = frame_from_normal(glm::normalize(glm::vec3(0.3f, -0.8f, 0.5f)));
+  // Within the tabulated points and beyond.
+  std::uint32_t indices[kPointsAtOnce];
+  for (std::uint32_t k = 0; k < kPointsAtOnce; ++k) indices[k] = 500 * k + k % 3;
+  Directions all, some;
+  sample_hemisphere(points, indices, frame, all);
+  sample_hemisphere(points, {indices + 5, 3}, frame, some);
+  for (std::size_t k = 0; k < kPointsAtOnce; ++k) {
+    const glm::vec3 expected = frame * sample_cosine_hemisphere(points.point2(indices[k]));
+    EXPECT_LT(glm::length(glm::vec3(all.x[k], all.y[k], all.z[k]) - expected), 1e-6f) << k;
+  }
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_EQ(some.x[k], all.x[5 + k]);
+    EXPECT_EQ(some.y[k], all.y[5 + k]);
+    EXPECT_EQ(some.z[k], all.z[5 + k]);
+  }
+}
+
 TEST(Frame, IsRightHandedForEveryNormal) {
   for (const glm::vec3 n : {glm::vec3(0, 0, 1), glm::vec3(0, 0, -1), glm::normalize(glm::vec3(1, -2, 0.5f))}) {
     const glm::mat3 frame = frame_from_normal(n);

@@ -14,6 +14,7 @@ namespace transom {
 
 class Panels;
 class SceneChange;
+class SobolSequence;
 struct HemisphereTally;
 
 /// Numbers of samples for one receiver.
@@ -102,7 +103,15 @@ class Gatherer {
   template <typename OriginOf>
   bool gather_again(const OriginOf& origin_of, const Node& middle, float radius, int count, std::uint32_t seed,
                     Elements told, const Gatherer& before, const SceneChange& change, GatherRow& row) const;
+  GatherRow gather_from_point(const Node& point, int count, std::uint32_t seed, Elements told) const;
   void add_hits(std::span<const Ray> rays, Elements told, HemisphereTally& tally) const;
+  void add_hit(const Hit& hit, glm::vec3 direction, Elements told, HemisphereTally& tally) const;
+  template <typename OriginOf>
+  static void add_rays(const OriginOf& origin_of, const SobolSequence& points, std::span<const std::uint32_t> indices,
+                       int count, std::vector<Ray>& rays);
+  static void add_rays_from_point(const Node& point, const SobolSequence& points,
+                                  std::span<const std::uint32_t> indices, int count, std::vector<Ray>& rays);
+  std::vector<float> past_further_openings(std::span<const Ray> rays, std::vector<Hit>& hits) const;
   float radius_of(int slot) const;
   bool may_see_through_openings(const Node& middle, float radius, const SceneChange& change) const;
   template <typename OriginOf>

@@ -15,6 +15,7 @@
 #include "transom/node_field.h"
 #include "transom/ray_scene.h"
 #include "transom/scene_change.h"
+#include "transom/screens.h"
 
 namespace transom {
 
@@ -124,6 +125,24 @@ class PointLinks {
   };
   static constexpr std::uint8_t kNotFar = 1;  // no share is stored so
   class ElementViews;
+  /// Whether openings may stand between places of a patch and points, asked in their order: once for each block.
+  class MayBeGlazed {
+   public:
+    MayBeGlazed(const PointLinks& links, std::span<const glm::vec3> places)
+        : links_(links), places_(links.openings_.places(places)) {}
+    bool operator()(int point) {
+      const std::size_t block = static_cast<std::size_t>(point) / kBlock;
+      if (block != block_) answer_ = links_.openings_.may_hide(places_, block);
+      block_ = block;
+      return answer_;
+    }
+
+   private:
+    const PointLinks& links_;
+    Screens::Places places_;
+    std::size_t block_ = static_cast<std::size_t>(-1);
+    bool answer_ = true;
+  };
   bool gets_light(int point) const {
     return neighbours_.begin.empty() || !neighbours_.of(static_cast<std::size_t>(point)).empty();
   }
@@ -162,8 +181,8 @@ class PointLinks {
     const float distance2 = std::max(kLeastDistance2, dx * dx + dy * dy + dz * dz);
     return height * cosine / (distance2 * distance2);
   }
-  void seen_shares(std::vector<Ray> segments, RayScene::Order order, std::vector<float>& shares,
-                   std::vector<std::uint8_t>& is_glazed) const;
+  void seen_shares(std::vector<Ray> segments, const std::vector<std::uint8_t>& may_be_glazed, RayScene::Order order,
+                   std::vector<float>& shares, std::vector<std::uint8_t>& is_glazed) const;
   void weigh_far(Link& link, int slot) const;
   LitPatch lit_patch(std::shared_ptr<const Link> link, std::span<const BrightElement> bright, std::size_t first,
                      std::size_t last) const;
@@ -175,6 +194,7 @@ class PointLinks {
   std::vector<float> x_, y_, z_, nx_, ny_, nz_;  // of the points, padded to whole blocks
   std::vector<glm::vec3> block_middle_;
   std::vector<float> block_radius_;
+  Screens openings_;  // that may stand between places and the blocks
 
   // What has been found is kept. It changes no answer, only what the next one costs.
   mutable std::mutex mutex_;

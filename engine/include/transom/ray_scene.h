@@ -64,6 +64,9 @@ class RayScene {
 
   bool has_openings() const { return has_openings_; }
 
+  /// The faces that rays of this kind may meet, ascending.
+  std::vector<int> faces_of(What what) const;
+
  private:
   struct Tree;
   struct Meeting;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <span>
 #include <vector>
 
 namespace transom {
@@ -16,6 +17,9 @@ inline std::uint32_t hash_seed(std::uint64_t a, std::uint64_t b) {
   return static_cast<std::uint32_t>((x ^ (x >> 31)) >> 16);
 }
 
+/// As many as rays are traced at once.
+inline constexpr std::size_t kPointsAtOnce = 16;
+
 /// Sobol's sequence in up to four dimensions (direction numbers of Joe & Kuo 2008), each dimension scrambled after
 /// Owen by hashing [Burley 2020, "Practical hash-based Owen scrambling"]. Every aligned block of 2^k points is a net.
 class SobolSequence {
@@ -25,6 +29,10 @@ class SobolSequence {
   /// Point number `index`; coordinates in [0, 1).
   glm::vec2 point2(std::uint32_t index) const;
   glm::vec4 point4(std::uint32_t index) const;
+
+  /// The first two coordinates of the points of these numbers.
+  void points2(const std::uint32_t (&indices)[kPointsAtOnce], float (&x)[kPointsAtOnce],
+               float (&y)[kPointsAtOnce]) const;
 
   /// The cell of the first two coordinates, of 2^bits an axis, that point number `index` lies in.
   glm::ivec2 cell2(std::uint32_t index, int bits) const;
@@ -52,6 +60,15 @@ glm::vec2 sample_disc(glm::vec2 u);
 /// Direction in the hemisphere around +z with density cos(theta) / pi.
 glm::vec3 sample_cosine_hemisphere(glm::vec2 u);
 
+struct Directions {
+  float x[kPointsAtOnce], y[kPointsAtOnce], z[kPointsAtOnce];
+};
+
+/// The same, around the third axis of `frame`, of the points of these numbers, at most kPointsAtOnce. Each direction
+/// depends on its number alone, not on how many there are.
+void sample_hemisphere(const SobolSequence& points, std::span<const std::uint32_t> indices, const glm::mat3& frame,
+                       Directions& directions);
+
 /// Right-handed orthonormal axes with `normal` as the third [Duff et al. 2017].
 glm::mat3 frame_from_normal(glm::vec3 normal);
 
@@ -71,8 +88,8 @@ class SphericalTriangle {
   glm::dvec3 sample(glm::dvec2 u) const;
 
  private:
-  glm::dvec3 a_, b_, c_;
-  double alpha_ = 0, solid_angle_ = 0, cos_c_ = 0;
+  glm::dvec3 a_, b_, towards_c_{0};  // the last: at a, along the arc to the third corner
+  double alpha_ = 0, sin_alpha_ = 0, cos_alpha_ = 1, solid_angle_ = 0, cos_c_ = 0;
 };
 
 }  // namespace transom
