@@ -122,7 +122,7 @@ void Engine::look_through_openings(const Node& node, int known_node, const Known
     const auto other = static_cast<std::size_t>(known_node);
     const NodeRows& rows = *known.engine->node_rows_;
     if (row.exposure == rows.exposure[other] && row.sky == rows.sky.row(other) &&
-        !gatherer_->may_see_through_openings(node, *known.change)) {
+        !gatherer_->may_meet_through_openings(node, options_.node_samples, node_seed(node), *known.change)) {
       row.sky = known.engine->node_sky_.row(other);
       row.through = known.slots_of(known.engine->node_through_.row(other), rows.unlit_through.row(other));
       return;
