@@ -145,14 +145,6 @@ std::vector<Share> Engine::to_patches(const std::vector<Share>& slots) const {
   return patches;
 }
 
-// Those of the slots that are no patches.
-std::vector<Share> Engine::unlit_of(const std::vector<Share>& slots) const {
-  std::vector<Share> unlit;
-  for (const Share& share : slots)
-    if (patch_of_slot_[share.index] < 0) unlit.push_back(share);
-  return unlit;
-}
-
 void Engine::assemble_transfer(const Known& known) {
   const std::size_t n = patch_rows_.size();
   patch_area_.resize(n);

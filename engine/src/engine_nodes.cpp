@@ -50,10 +50,10 @@ struct Engine::TrialLight {
 
 /// Nodes as far as they have been gathered.
 struct Engine::NodeTrial {
-  std::vector<GatherRow> rows;
+  std::vector<GatherRow> rows;  // by slot
   std::vector<TrialLight> lights;
-  std::vector<std::vector<Share>> own_sky;               // seen without looking through an opening
-  std::vector<std::vector<Share>> unlit, unlit_through;  // slots that are no patches
+  std::vector<std::vector<Share>> own_sky;  // seen without looking through an opening
+  std::vector<std::vector<Share>> patches;  // all that are seen
   float longest_edge;
 
   // Larger for parts that are a smaller part of a picture.
@@ -96,7 +96,7 @@ GatherRow Engine::surroundings_of_node(const Node& node, int known_node, const K
   if (known_node >= 0) {
     const auto other = static_cast<std::size_t>(known_node);
     const NodeRows& rows = *known.engine->node_rows_;
-    row.reached = known.slots_of(rows.patches.row(other), rows.unlit.row(other));
+    row.reached = known.change->renumbered(rows.reached.row(other));
     row.sky = rows.sky.row(other);
     row.near = known.change->renumbered_elements(rows.near.row(other));
     row.exposure = rows.exposure[other];
@@ -109,22 +109,15 @@ GatherRow Engine::surroundings_of_node(const Node& node, int known_node, const K
   return gatherer_->surroundings_of_point(node, options_.node_samples, node_seed(node));
 }
 
-// The slots here of shares of patches and of other slots there.
-std::vector<Share> Engine::Known::slots_of(std::vector<Share> patches, const std::vector<Share>& unlit) const {
-  for (Share& share : patches) share.index = engine->slot_of_patch_[share.index];
-  patches.insert(patches.end(), unlit.begin(), unlit.end());
-  return change->renumbered(std::move(patches));
-}
-
 // What a node sees through openings, and all that it sees of the sky, added to its surroundings, by slot.
 void Engine::look_through_openings(const Node& node, int known_node, const Known& known, GatherRow& row) const {
   if (known_node >= 0 && known.has_openings) {
     const auto other = static_cast<std::size_t>(known_node);
     const NodeRows& rows = *known.engine->node_rows_;
     if (row.exposure == rows.exposure[other] && row.sky == rows.sky.row(other) &&
-        !gatherer_->may_see_through_openings(node, *known.change)) {
+        !gatherer_->may_meet_through_openings(node, options_.node_samples, node_seed(node), *known.change)) {
       row.sky = known.engine->node_sky_.row(other);
-      row.through = known.slots_of(known.engine->node_through_.row(other), rows.unlit_through.row(other));
+      row.through = known.change->renumbered(rows.through.row(other));
       return;
     }
   }
@@ -136,8 +129,8 @@ void Engine::gather_new_nodes(NodeTrial& trial, int first_part, Known& known) {
   const std::vector<Node>& nodes = nodes_->nodes();
   const std::size_t first = trial.rows.size(), count = nodes.size() - first;
   trial.rows.resize(nodes.size());
-  for (std::vector<std::vector<Share>>* rows : {&trial.own_sky, &trial.unlit, &trial.unlit_through})
-    rows->resize(nodes.size());
+  trial.own_sky.resize(nodes.size());
+  trial.patches.resize(nodes.size());
   for (TrialLight& light : trial.lights) light.at_nodes.resize(nodes.size());
   known.node.resize(nodes.size(), -1);
   std::vector<char> is_exposed(count);
@@ -151,18 +144,21 @@ void Engine::gather_new_nodes(NodeTrial& trial, int first_part, Known& known) {
     row = surroundings_of_node(nodes[i], known.node[i], known);
     trial.own_sky[i] = row.sky;
     look_through_openings(nodes[i], known.node[i], known, row);
-    trial.unlit[i] = unlit_of(row.reached);
-    trial.unlit_through[i] = unlit_of(row.through);
-    row.reached = to_patches(row.reached);
-    row.through = to_patches(row.through);
     is_exposed[k] = row.exposure >= kExposedNode;
+    std::vector<Share>& patches = trial.patches[i];
+    patches = to_patches(row.reached);
+    const auto reached_count = static_cast<std::ptrdiff_t>(patches.size());
+    const std::vector<Share> through = to_patches(row.through);
+    patches.insert(patches.end(), through.begin(), through.end());
     float sky = 0;
     for (const Share& share : row.sky) sky += share.weight;
     for (TrialLight& light : trial.lights) {
       light.at_nodes[i] = light.sky * sky;
-      for (const std::vector<Share>* shares : {&row.reached, &row.through})
-        for (const Share& share : *shares) light.at_nodes[i] += share.weight * light.radiosity[share.index];
+      for (const Share& share : patches) light.at_nodes[i] += share.weight * light.radiosity[share.index];
     }
+    std::inplace_merge(patches.begin(), patches.begin() + reached_count, patches.end(),
+                       [](const Share& a, const Share& b) { return a.index < b.index; });
+    merge_shares(patches);
   });
   nodes_->expose(is_exposed, first_part);
 }
@@ -199,7 +195,7 @@ void Engine::resolve_near_light(const NodeTrial& trial) {
   });
   std::vector<std::vector<Share>> rows(nodes_->nodes().size());
   parallel_indices(rows.size(), kGrain, [&](std::size_t i) { rows[i] = resolved_by_nodes(trial.rows[i].near); });
-  for (const std::vector<Share>& row : rows) node_near_.append(row);
+  node_near_ = SparseRows::of(rows);
 }
 
 // Whether light may change within a part otherwise than linearly, so that it is worth a node in its middle.
@@ -255,7 +251,7 @@ void Engine::gather_nodes(Known& known) {
       known.nodes_by_seed.emplace(node_seed(known.engine->nodes_->nodes()[i]), static_cast<int>(i));
   const float edge = facts_.maximum_edge_m;
   nodes_ = std::make_unique<NodeField>(*mesh_, *rays_, slots, kThin * edge);
-  NodeTrial trial{{}, trial_lights(), {}, {}, {}, edge};
+  NodeTrial trial{{}, trial_lights(), {}, {}, edge};
   gather_new_nodes(trial, 0, known);
   for (TrialLight& light : trial.lights) {
     double sum = 0, count = 0;
@@ -289,28 +285,19 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
   facts_.kept_node_rows =
       static_cast<int>(std::count_if(known.node.begin(), known.node.end(), [](int node) { return node >= 0; }));
   known.has_same_nodes = known.has_same_faces() && nodes_->nodes() == known.engine->nodes_->nodes();
+  node_patches_ = CompactRows(SparseRows::of(trial.patches));
+  trial.patches.clear();
+  node_sky_ = SparseRows::of(trial.rows, &GatherRow::sky);
   const auto found = std::make_shared<NodeRows>();
-  SparseRows all;
-  for (std::size_t i = 0; i < trial.rows.size(); ++i) {
-    const GatherRow& row = trial.rows[i];
-    found->patches.append(row.reached);
-    found->sky.append(trial.own_sky[i]);
-    found->near.append(row.near);
-    found->unlit.append(trial.unlit[i]);
-    found->unlit_through.append(trial.unlit_through[i]);
+  found->reached = SparseRows::of(trial.rows, &GatherRow::reached);
+  found->through = SparseRows::of(trial.rows, &GatherRow::through);
+  found->sky = SparseRows::of(trial.own_sky);
+  found->near = SparseRows::of(trial.rows, &GatherRow::near);
+  for (const GatherRow& row : trial.rows) {
     found->exposure.push_back(row.exposure);
     found->harmonic_distance.push_back(row.harmonic_distance);
     found->inverse_distance.push_back(row.inverse_distance);
-    node_sky_.append(row.sky);
-    node_through_.append(row.through);
-    std::vector<Share> patches = row.reached;
-    patches.insert(patches.end(), row.through.begin(), row.through.end());
-    std::inplace_merge(patches.begin(), patches.begin() + static_cast<std::ptrdiff_t>(row.reached.size()),
-                       patches.end(), [](const Share& a, const Share& b) { return a.index < b.index; });
-    merge_shares(patches);
-    all.append(patches);
   }
-  node_patches_ = CompactRows(all);
   node_rows_ = found;
 }
 

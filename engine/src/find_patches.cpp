@@ -69,7 +69,8 @@ Engine::PatchRow Engine::patch_row(int slot, const Known& known) const {
   GatherRow beyond;
   beyond.exposure = row.around->exposure;
   if (known_row && known.has_openings && row.around->exposure == known_row->around->exposure &&
-      row.around->sky == known_row->around->sky && !gatherer_->may_see_through_openings(slot, *known.change)) {
+      row.around->sky == known_row->around->sky &&
+      !gatherer_->may_meet_through_openings(slot, options_.patch_samples, patch_seed(slot), *known.change)) {
     beyond.sky = known_row->beyond->sky;
     beyond.through = known.change->renumbered(known_row->beyond->through);
   } else {

@@ -117,15 +117,16 @@ void Gatherer::add_hit(const Hit& hit, glm::vec3 direction, Elements told, Hemis
   }
 }
 
-template <typename OriginOf>
-void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, int count, std::uint32_t seed,
-                               GatherRow& row) const {
-  if (opening_triangles_.empty() || row.exposure == 0) return;
+// Rays towards the openings, in proportion to the solid angle, with a floor, and none for what lies behind the
+// receiver. visit(ray up to the opening, cos(theta) x solid angle / rays [sr], face): false to stop. Returns whether it
+// went on.
+template <typename OriginOf, typename Visit>
+bool Gatherer::visit_opening_rays(const Origin& middle, const OriginOf& origin_of, int count, std::uint32_t seed,
+                                  const Visit& visit) const {
   const auto triangle_from = [](const OpeningTriangle& t, glm::vec3 p) {
     return SphericalTriangle(glm::normalize(glm::dvec3(t.corner[0] - p)), glm::normalize(glm::dvec3(t.corner[1] - p)),
                              glm::normalize(glm::dvec3(t.corner[2] - p)));
   };
-  // Rays in proportion to the solid angle, with a floor, and none for what lies behind the receiver.
   std::vector<double> importance(opening_triangles_.size(), 0.0);
   double total = 0;
   for (std::size_t k = 0; k < opening_triangles_.size(); ++k) {
@@ -137,14 +138,6 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
     importance[k] = triangle_from(t, middle.position).solid_angle() + 1e-9;
     total += importance[k];
   }
-  if (total == 0) return;
-
-  struct Candidate {
-    float weight;  // cos(theta) x solid angle / rays [sr]
-    int face;
-  };
-  std::vector<Ray> segments;
-  std::vector<Candidate> candidates;
   for (std::size_t k = 0; k < opening_triangles_.size(); ++k) {
     if (importance[k] == 0) continue;
     const OpeningTriangle& t = opening_triangles_[k];
@@ -179,10 +172,28 @@ void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, 
       if (!(distance > 0)) continue;
       const float cosine = glm::dot(to_opening, origin.normal) / distance;
       if (cosine <= 0) continue;
-      segments.push_back({origin.position, to_opening / distance, 0, distance - mesh_.faces().ray_offset()});
-      candidates.push_back({cosine * solid_angle / static_cast<float>(n), t.face});
+      const Ray ray{origin.position, to_opening / distance, 0, distance - mesh_.faces().ray_offset()};
+      if (!visit(ray, cosine * solid_angle / static_cast<float>(n), t.face)) return false;
     }
   }
+  return true;
+}
+
+template <typename OriginOf>
+void Gatherer::gather_openings(const Origin& middle, const OriginOf& origin_of, int count, std::uint32_t seed,
+                               GatherRow& row) const {
+  if (row.exposure == 0) return;
+  struct Candidate {
+    float weight;  // cos(theta) x solid angle / rays [sr]
+    int face;
+  };
+  std::vector<Ray> segments;
+  std::vector<Candidate> candidates;
+  visit_opening_rays(middle, origin_of, count, seed, [&](const Ray& ray, float weight, int face) {
+    segments.push_back(ray);
+    candidates.push_back({weight, face});
+    return true;
+  });
   if (segments.empty()) return;
   std::vector<std::uint8_t> blocked(segments.size());
   rays_.occluded(RayScene::What::kAll, segments, blocked, RayScene::Order::kCoherent);
@@ -374,21 +385,33 @@ float Gatherer::radius_of(int index) const {
   return radius;
 }
 
-bool Gatherer::may_see_through_openings(const Node& middle, float radius, const SceneChange& change) const {
-  return std::any_of(opening_triangles_.begin(), opening_triangles_.end(), [&](const OpeningTriangle& t) {
-    const bool is_ahead = std::any_of(t.corner, t.corner + 3, [&](const glm::vec3& corner) {
-      return glm::dot(corner - middle.position, middle.normal) >= 0;
-    });
-    return is_ahead && change.may_meet(middle.position, radius, t.corner);
-  });
+// Looked at as shafts first, which is cheap, then ray by ray.
+template <typename OriginOf>
+bool Gatherer::may_meet_through_openings(const Node& middle, float radius, const OriginOf& origin_of, int count,
+                                         std::uint32_t seed, const SceneChange& change) const {
+  const bool any_shaft =
+      std::any_of(opening_triangles_.begin(), opening_triangles_.end(), [&](const OpeningTriangle& t) {
+        const bool is_ahead = std::any_of(t.corner, t.corner + 3, [&](const glm::vec3& corner) {
+          return glm::dot(corner - middle.position, middle.normal) >= 0;
+        });
+        return is_ahead && change.may_meet(middle.position, radius, t.corner);
+      });
+  return any_shaft &&
+         !visit_opening_rays({middle.position, middle.normal}, origin_of, count, seed, [&](const Ray& ray, float, int) {
+           return !change.may_meet(Ray{ray.origin, ray.direction});
+         });
 }
 
-bool Gatherer::may_see_through_openings(const Node& point, const SceneChange& change) const {
-  return may_see_through_openings(point, 0, change);
+bool Gatherer::may_meet_through_openings(const Node& point, GatherSamples samples, std::uint32_t seed,
+                                         const SceneChange& change) const {
+  const auto origin_of = [&](glm::vec2) { return Origin{point.position, point.normal}; };
+  return may_meet_through_openings(point, 0, origin_of, samples.openings, seed, change);
 }
 
-bool Gatherer::may_see_through_openings(int slot, const SceneChange& change) const {
-  return may_see_through_openings(mesh_.middle_of(slot), radius_of(slot), change);
+bool Gatherer::may_meet_through_openings(int slot, GatherSamples samples, std::uint32_t seed,
+                                         const SceneChange& change) const {
+  return may_meet_through_openings(mesh_.middle_of(slot), radius_of(slot), places_on(slot), samples.openings, seed,
+                                   change);
 }
 
 GatherRow Gatherer::gather_at_point(const Node& point, GatherSamples samples, std::uint32_t seed) const {

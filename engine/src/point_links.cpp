@@ -100,38 +100,46 @@ PointLinks::Exposed PointLinks::exposed_part(int slot_index) const {
   return exposed;
 }
 
-const float* PointLinks::Link::near_weight_of(int point, std::size_t element_count) const {
-  const auto found = std::lower_bound(near_point.begin(), near_point.end(), point);
-  if (found == near_point.end() || *found != point) return nullptr;
-  return &near_weight[static_cast<std::size_t>(found - near_point.begin()) * element_count];
-}
-
-PointLinks::KnownPoints::KnownPoints(const Known& all_known, const Link* known_link)
-    : known(all_known), link(known_link) {
-  if (!link) return;
-  seen.assign(known.links->x_.size(), 0);
-  for (std::size_t k = 0; k < link->block.size(); ++k)
-    std::copy_n(link->seen.begin() + static_cast<std::ptrdiff_t>(k * kBlock), kBlock,
-                seen.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(link->block[k]) * kBlock));
-  is_asked.assign(seen.size(), 0);
-  for (std::size_t k = 0; k < link->block.size(); ++k)
-    for (std::size_t bit = 0; bit < kBlock; ++bit)
-      is_asked[static_cast<std::size_t>(link->block[k]) * kBlock + bit] = link->asked[k] >> bit & 1;
-  for (const Partial& partial : link->partial) seen[static_cast<std::size_t>(partial.point)] = partial.seen_of_middle;
-  is_glazed.assign(seen.size(), 0);
-  for (const int point : link->glazed_point) is_glazed[static_cast<std::size_t>(point)] = 1;
+PointLinks::KnownPoints::KnownPoints(const Known& known, const Link* link) : known_(known), link_(link) {
+  if (!link_) return;
+  place_.assign(known_.links->block_middle_.size(), -1);
+  for (std::size_t k = 0; k < link_->block.size(); ++k)
+    place_[static_cast<std::size_t>(link_->block[k])] = static_cast<int>(k);
+  is_glazed_.assign(known_.links->point_count_, 0);
+  for (const int point : link_->glazed_point) is_glazed_[static_cast<std::size_t>(point)] = 1;
 }
 
 int PointLinks::KnownPoints::number(int point) const {
-  const int known_point = link ? known.point[static_cast<std::size_t>(point)] : -1;
-  if (known_point < 0 || !known.links->gets_light(known_point)) return -1;
-  return known.has_same_glazing || !is_glazed[static_cast<std::size_t>(known_point)] ? known_point : -1;
+  const int known_point = link_ ? known_.point[static_cast<std::size_t>(point)] : -1;
+  if (known_point < 0 || !known_.links->gets_light(known_point)) return -1;
+  return known_.has_same_glazing || !is_glazed(known_point) ? known_point : -1;
+}
+
+bool PointLinks::KnownPoints::is_asked(int known_point) const {
+  const auto point = static_cast<std::size_t>(known_point);
+  const int place = place_[point / kBlock];
+  return place >= 0 && (link_->asked[static_cast<std::size_t>(place)] >> point % kBlock & 1) != 0;
+}
+
+std::uint8_t PointLinks::KnownPoints::seen_of_middle(int known_point) const {
+  const auto point = static_cast<std::size_t>(known_point);
+  const int place = place_[point / kBlock];
+  if (place < 0) return 0;
+  if (const Partial* seen_in_part = is_asked(known_point) ? partial(known_point) : nullptr)
+    return seen_in_part->seen_of_middle;
+  return link_->seen[static_cast<std::size_t>(place) * kBlock + point % kBlock];
 }
 
 const PointLinks::Partial* PointLinks::KnownPoints::partial(int known_point) const {
-  const auto found = std::lower_bound(link->partial.begin(), link->partial.end(), known_point,
+  const auto found = std::lower_bound(link_->partial.begin(), link_->partial.end(), known_point,
                                       [](const Partial& partial, int point) { return partial.point < point; });
-  return found != link->partial.end() && found->point == known_point ? &*found : nullptr;
+  return found != link_->partial.end() && found->point == known_point ? &*found : nullptr;
+}
+
+const float* PointLinks::KnownPoints::near_weight_of(int known_point) const {
+  const auto found = std::lower_bound(link_->near_point.begin(), link_->near_point.end(), known_point);
+  if (found == link_->near_point.end() || *found != known_point) return nullptr;
+  return &link_->near_weight[static_cast<std::size_t>(found - link_->near_point.begin()) * link_->element.size()];
 }
 
 // The link of a patch in the other state, if the same part of the patch was exposed there.
@@ -245,10 +253,10 @@ void PointLinks::link_near(Link& link, int slot, const KnownPoints& known) const
   MayBeGlazed may_glaze(*this, middles);
   for (const int i : link.near_point) {
     const int known_point = known.number(i);
-    const float* before = known_point >= 0 ? known.link->near_weight_of(known_point, element_count) : nullptr;
-    if (before && !known.known.change->may_meet({x_[i], y_[i], z_[i]}, middle, radius)) {
+    const float* before = known_point >= 0 ? known.near_weight_of(known_point) : nullptr;
+    if (before && !known.change().may_meet({x_[i], y_[i], z_[i]}, middle, radius)) {
       kept.push_back(i);
-      if (known.is_glazed[static_cast<std::size_t>(known_point)]) link.glazed_point.push_back(i);
+      if (known.is_glazed(known_point)) link.glazed_point.push_back(i);
       weights.insert(weights.end(), before, before + element_count);
       continue;
     }

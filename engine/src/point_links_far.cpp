@@ -37,11 +37,11 @@ void PointLinks::see_middle(MiddleView& view, const std::vector<int>& far_points
     if (known_point >= 0) {
       if (entered != block) {
         entered = block;
-        is_block_met = known.known.change->may_meet(middle, block_middle_[block], block_radius_[block]);
+        is_block_met = known.change().may_meet(middle, block_middle_[block], block_radius_[block]);
       }
-      if (!is_block_met || !known.known.change->may_meet(segment)) {
-        view.seen[i] = known.seen[static_cast<std::size_t>(known_point)];
-        if (known.is_glazed[static_cast<std::size_t>(known_point)]) view.glazed_point.push_back(point);
+      if (!is_block_met || !known.change().may_meet(segment)) {
+        view.seen[i] = known.seen_of_middle(known_point);
+        if (known.is_glazed(known_point)) view.glazed_point.push_back(point);
         continue;
       }
     }
@@ -136,8 +136,8 @@ std::vector<int> PointLinks::ElementViews::not_known(const std::vector<int>& poi
   std::vector<int> unknown;
   for (const int point : points) {
     const int known_point = known_.number(point);
-    if (known_point < 0 || !known_.is_asked[static_cast<std::size_t>(known_point)] ||
-        known_.known.change->may_meet(place(point), view_.exposed.middle, view_.exposed.radius)) {
+    if (known_point < 0 || !known_.is_asked(known_point) ||
+        known_.change().may_meet(place(point), view_.exposed.middle, view_.exposed.radius)) {
       unknown.push_back(point);
       continue;
     }

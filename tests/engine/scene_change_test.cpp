@@ -4,6 +4,8 @@
 #include <random>
 
 #include "rooms.h"
+#include "transom/gather.h"
+#include "transom/panels.h"
 #include "transom/sampling.h"
 #include "transom/scene_change.h"
 
@@ -132,6 +134,33 @@ TEST_F(AMovedBox, TheConeThroughATriangleHoldsTheRaysThroughIt) {
   }
   EXPECT_GT(met, 100);
   EXPECT_LT(suspected, 4000);
+}
+
+// A point beside the shadow that the box throws on it from the opening keeps what it sees outdoors.
+TEST_F(AMovedBox, PointsThatSeeAnOpeningPastItLookAgainAndFewOthers) {
+  const SkyBinIndex sky(test::tregenza());
+  const Panels panels_there(before.faces, before.scene.materials, before.scene.openings),
+      panels_here(after.faces, after.scene.materials, after.scene.openings);
+  const Gatherer there(before.mesh, before.rays, before.scene.materials, before.scene.openings, sky, panels_there),
+      here(after.mesh, after.rays, after.scene.materials, after.scene.openings, sky, panels_here);
+  const GatherSamples samples{0, 64};
+  const SobolSequence places(11);
+  const std::uint32_t count = 1024;
+  int looking_again = 0, changed = 0;
+  for (std::uint32_t k = 0; k < count; ++k) {
+    const glm::vec2 u = places.point2(k);
+    const Node point{{3.8f * u.x - 1.9f, 3.8f * u.y - 1.9f, -1.49f}, {0, 0, 1}};
+    GatherRow row_before, row_after;
+    there.look_through_openings(point, samples, k, row_before);
+    here.look_through_openings(point, samples, k, row_after);
+    const bool is_changed = row_before.sky != row_after.sky,
+               looks_again = here.may_meet_through_openings(point, samples, k, change);
+    EXPECT_TRUE(looks_again || !is_changed);
+    changed += is_changed;
+    looking_again += looks_again;
+  }
+  EXPECT_GT(changed, 100);
+  EXPECT_LT(looking_again, 1.2 * changed);
 }
 
 TEST_F(AMovedBox, SegmentsToASphereHoldThoseThatMeetIt) {

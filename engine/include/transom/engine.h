@@ -161,17 +161,16 @@ class Engine {
     std::vector<int> node;  // its number of each node here, or -1
     bool has_same_faces() const { return change && change->is_none(); }
     int patch(int slot) const;  // its number of the patch of a slot here, or -1
-    std::vector<Share> slots_of(std::vector<Share> patches, const std::vector<Share>& unlit) const;
   };
   /// What a patch sees, by slot: without looking through openings; and through them, with all of the sky.
   struct PatchRow {
     std::shared_ptr<const GatherRow> around, beyond;
   };
-  /// What nodes see without looking through openings: patches, and the sky seen by itself.
+  /// What nodes see, for edits: by slot, since an edit may make patches of slots that are none.
   struct NodeRows {
-    SparseRows patches, sky;
-    SparseRows near;                  // elements of the nearest slots
-    SparseRows unlit, unlit_through;  // slots that are no patches: an edit may make them so
+    SparseRows reached, through;  // without looking through openings, and through them
+    SparseRows sky;               // seen by itself
+    SparseRows near;              // elements of the nearest slots
     std::vector<float> exposure, harmonic_distance;
     std::vector<std::int64_t> inverse_distance;
   };
@@ -223,7 +222,6 @@ class Engine {
   std::vector<Share> resolved_by_nodes(const std::vector<Share>& elements) const;
   void gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& first_reflection) const;
   std::vector<Share> to_patches(const std::vector<Share>& slots) const;
-  std::vector<Share> unlit_of(const std::vector<Share>& slots) const;
   glm::vec3 sky_light(const Lighting& lighting, const SparseRows& rows, std::size_t row) const;
   void find_shafts(Condition& condition, std::vector<glm::vec3>& residual) const;
   double find_panel_radiance(const std::vector<glm::vec3>& radiosity, Lighting& lighting) const;
@@ -275,7 +273,7 @@ class Engine {
   // Where light is shown.
   std::unique_ptr<NodeField> nodes_;
   std::shared_ptr<const NodeRows> node_rows_;
-  SparseRows node_sky_, node_through_;        // all of the sky; patches seen through openings
+  SparseRows node_sky_;                       // all of the sky
   CompactRows node_patches_;                  // all that nodes see of patches
   std::vector<NodeShares> nodes_at_element_;  // what speaks for each element of patches, at its middle
   SparseRows node_near_;  // what the nodes, then the patches, send close by: those with their weights, less these

@@ -75,9 +75,11 @@ class Gatherer {
   GatherRow surroundings_of_patch(int slot, GatherSamples samples, std::uint32_t seed, GatherRow known,
                                   const Gatherer& before, const SceneChange& change) const;
 
-  /// Whether a ray through an opening may meet what has changed, from a point, or from a patch. False is certain.
-  bool may_see_through_openings(const Node& point, const SceneChange& change) const;
-  bool may_see_through_openings(int slot, const SceneChange& change) const;
+  /// Whether a ray that `look_through_openings` casts with these samples and seed may meet what has changed. False is
+  /// certain.
+  bool may_meet_through_openings(const Node& point, GatherSamples samples, std::uint32_t seed,
+                                 const SceneChange& change) const;
+  bool may_meet_through_openings(int slot, GatherSamples samples, std::uint32_t seed, const SceneChange& change) const;
 
   /// Adds what is seen through openings, `through` and `sky`, to a row of which the exposure is known.
   void look_through_openings(const Node& point, GatherSamples samples, std::uint32_t seed, GatherRow& row) const;
@@ -113,7 +115,12 @@ class Gatherer {
                                   std::span<const std::uint32_t> indices, int count, std::vector<Ray>& rays);
   std::vector<float> past_further_openings(std::span<const Ray> rays, std::vector<Hit>& hits) const;
   float radius_of(int slot) const;
-  bool may_see_through_openings(const Node& middle, float radius, const SceneChange& change) const;
+  template <typename OriginOf>
+  bool may_meet_through_openings(const Node& middle, float radius, const OriginOf& origin_of, int count,
+                                 std::uint32_t seed, const SceneChange& change) const;
+  template <typename OriginOf, typename Visit>
+  bool visit_opening_rays(const Origin& middle, const OriginOf& origin_of, int count, std::uint32_t seed,
+                          const Visit& visit) const;
   template <typename OriginOf>
   void gather_openings(const Origin& middle, const OriginOf& origin_of, int count, std::uint32_t seed,
                        GatherRow& row) const;

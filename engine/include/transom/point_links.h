@@ -79,16 +79,24 @@ class PointLinks {
     std::vector<float> near_sum;     // for each near point: the sum of these
     std::vector<glm::vec4> element;  // of the patch: middle, lifted, and area
     std::vector<int> glazed_point;   // ascending: points between which and the patch some opening stands
-    const float* near_weight_of(int point, std::size_t element_count) const;  // null: not among the near points
   };
-  /// What another state of the scene had as the link of a patch.
-  struct KnownPoints {
+  /// What another state of the scene had as the link of a patch. Points by their numbers there.
+  class KnownPoints {
+   public:
     KnownPoints(const Known& known, const Link* link);
-    const Known& known;
-    const Link* link;                                     // null: none is known
-    std::vector<std::uint8_t> seen, is_glazed, is_asked;  // by the numbers of points there; seen: of the middle
-    int number(int point) const;                          // -1: to be found anew
-    const Partial* partial(int known_point) const;        // null: none
+    const SceneChange& change() const { return *known_.change; }
+    int number(int point) const;  // there; -1: to be found anew
+    bool is_glazed(int known_point) const { return is_glazed_[static_cast<std::size_t>(known_point)] != 0; }
+    bool is_asked(int known_point) const;
+    std::uint8_t seen_of_middle(int known_point) const;
+    const Partial* partial(int known_point) const;       // null: none
+    const float* near_weight_of(int known_point) const;  // null: not among the near points
+
+   private:
+    const Known& known_;
+    const Link* link_;                     // null: none is known
+    std::vector<int> place_;               // of each block of points, among those of the link; -1: not among them
+    std::vector<std::uint8_t> is_glazed_;  // by point
   };
   struct LitPatch {
     std::shared_ptr<const Link> link;

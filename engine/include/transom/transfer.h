@@ -3,6 +3,7 @@
 
 #include <xmmintrin.h>
 
+#include <functional>
 #include <glm/glm.hpp>
 #include <vector>
 
@@ -19,6 +20,17 @@ struct SparseRows {
   void append(const std::vector<Share>& row) {
     entries.insert(entries.end(), row.begin(), row.end());
     begin.push_back(entries.size());
+  }
+  /// One row of each object, as row_of(object) has it, in no more memory than they need.
+  template <typename Object, typename RowOf = std::identity>
+  static SparseRows of(const std::vector<Object>& objects, RowOf row_of = {}) {
+    std::size_t count = 0;
+    for (const Object& object : objects) count += std::invoke(row_of, object).size();
+    SparseRows rows;
+    rows.begin.reserve(objects.size() + 1);
+    rows.entries.reserve(count);
+    for (const Object& object : objects) rows.append(std::invoke(row_of, object));
+    return rows;
   }
   std::vector<Share> row(std::size_t i) const {
     return {entries.begin() + static_cast<std::ptrdiff_t>(begin[i]),
