@@ -94,7 +94,8 @@ void FrameRenderer::finish(const Drawing& drawing, int row) const {
     exterior[c.pixel] += c.emitted_outdoors;
   }
   for (const ViewSamples::Outlook& o : samples.outlooks)
-    exterior[o.pixel] += o.weight * drawing.lighting.condition.seen(o.direction, o.place, engine_.sky_index(), drawing.sky);
+    exterior[o.pixel] +=
+        o.weight * drawing.lighting.condition.seen(o.direction, o.place, engine_.sky_index(), drawing.sky);
   for (const ViewSamples::SeenPanel& p : samples.panels)
     exterior[p.pixel] += p.weight * drawing.lighting.panel_radiance[p.bin];
   if (!has_components) {
@@ -179,12 +180,8 @@ Frame FrameRenderer::render(const View& view, const Lighting& lighting, FrameOpt
   if (options.components)
     for (Picture* part : {&frame.sun, &frame.sky, &frame.indirect, &frame.emitted, &frame.exterior})
       part->resize(samples_->centre.size());
-  Drawing drawing{lighting,
-                  CameraRays(view),
-                  glm::vec3(view.position - engine_.faces().origin),
-                  options.components,
-                  options.sky,
-                  frame};
+  Drawing drawing{lighting,           CameraRays(view), glm::vec3(view.position - engine_.faces().origin),
+                  options.components, options.sky,      frame};
   drawing.shown = shown_radiance(engine_, lighting, options.components);
   is_edge_ = samples_->has_edge;
 

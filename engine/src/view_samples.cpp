@@ -59,8 +59,7 @@ BeamPoint add_sample(const Engine& engine, const Seen& seen, float weight, int p
     return point;
   }
   if (point.surface < 0) {
-    row.outlooks.push_back(
-        {pixel, weight * seen.through, seen.direction, SkyPicture::place_of(seen.direction)});
+    row.outlooks.push_back({pixel, weight * seen.through, seen.direction, SkyPicture::place_of(seen.direction)});
     return point;
   }
   const NodeShares shares = engine.shown_at(seen.hit.face, seen.hit.side, seen.hit.st, point.position);

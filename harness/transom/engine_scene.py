@@ -19,6 +19,7 @@ from transom.glass import diffuse_reflectance, transmittance_table
 from transom.scene import content_key
 from transom.scene.model import Scene
 
+
 def engine_geometry(scene: Scene) -> _engine.SceneGeometry:
     """Faces, materials, openings and point sources; after the openings of the scene one more for each panel group."""
     mesh = scene.mesh

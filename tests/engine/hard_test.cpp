@@ -120,8 +120,7 @@ TEST(Condition, LightThatIsNoNumberIsRefused) {
   sky.sky_luminance[7] = nan;
   colour.sky_colour.x = std::numeric_limits<float>::infinity();
   direction.beams.push_back({glm::vec3(nan), glm::vec3(1)});
-  for (const Condition& bad : {sky, colour, direction})
-    EXPECT_THROW(engine.relight(bad), InputError);
+  for (const Condition& bad : {sky, colour, direction}) EXPECT_THROW(engine.relight(bad), InputError);
 }
 
 TEST(SkyPicture, WhatIsNoPictureIsRefused) {

@@ -39,8 +39,8 @@ TEST(SkyPicture, IsSeenWhereItsTexelsAre) {
     for (int column = 0; column < picture.width; ++column) {
       const float theta = kPi / 2 * static_cast<float>(row) / static_cast<float>(picture.height - 1) - 1e-6f,
                   phi = 2 * kPi * (static_cast<float>(column) + 0.5f) / static_cast<float>(picture.width);
-      const glm::vec3 found = seen(
-          condition, picture, {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)});
+      const glm::vec3 found =
+          seen(condition, picture, {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)});
       EXPECT_NEAR(found.y, static_cast<float>(row * picture.width + column), 0.01f);
       EXPECT_FLOAT_EQ(found.x, found.y / 2);
       EXPECT_FLOAT_EQ(found.z, found.y * 2);

@@ -59,7 +59,11 @@ def test_means_beside_the_sun_and_at_the_horizon_are_those_of_many_nodes() -> No
     across = np.sqrt(1 - sine**2)[:, :, None]
     shape = (bins.count, 40, 40)
     cells = np.stack(
-        [across * np.cos(azimuth)[:, None], across * np.sin(azimuth)[:, None], np.broadcast_to(sine[:, :, None], shape)],
+        [
+            across * np.cos(azimuth)[:, None],
+            across * np.sin(azimuth)[:, None],
+            np.broadcast_to(sine[:, :, None], shape),
+        ],
         axis=-1,
     )
     exact = luminance(cells.reshape(-1, 3)).reshape(bins.count, -1).mean(axis=1)
