@@ -104,7 +104,8 @@ bool cut(const Polygon& polygon, std::span<const int> in_plane, const std::vecto
   return covered > 4 * tolerance && covered >= cutter.least_share * glm::length(on_plane[1] - on_plane[0]);
 }
 
-// A plane, its normal up to the sign and in thousandths: faces of one wall need no more.
+// A plane, its normal up to the sign and in thousandths, to be looked up by; its offset is compared with a tolerance.
+// Where rounding puts faces of one wall into two planes, each of these cuts as a wall of its own.
 struct Plane {
   glm::ivec3 normal;
   double offset;

@@ -139,10 +139,14 @@ void FrameRenderer::draw(Drawing& drawing) {
   centre_share_.resize(std::max(centre_share_.size(), beam_count));
   for (std::size_t b = 0; b < beam_count; ++b) centre_share_[b].resize(height * width);
   is_lit_row_.resize(beam_count * height);
-  is_tested_.assign(beam_count, std::vector<char>(height * width));
+  is_tested_.resize(std::max(is_tested_.size(), beam_count));
+  for (std::size_t b = 0; b < beam_count; ++b) is_tested_[b].resize(height * width);
   ends_.assign(beam_count * height, {});
   parallel_indices(height, 1, [&](std::size_t row) {
-    for (std::size_t b = 0; b < beam_count; ++b) find_centre_shares(drawing, b, static_cast<int>(row));
+    for (std::size_t b = 0; b < beam_count; ++b) {
+      if (!drawing.masks) std::fill_n(&is_tested_[b][row * width], width, char{0});
+      find_centre_shares(drawing, b, static_cast<int>(row));
+    }
   });
   Picture& into = drawing.has_components ? drawing.frame.sun : drawing.frame.radiance;
   parallel_indices(height, 1, [&](std::size_t row) {

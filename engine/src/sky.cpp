@@ -79,8 +79,8 @@ glm::vec3 Condition::seen(glm::vec3 direction, glm::vec2 place, const SkyBinInde
 }
 
 void SkyPicture::validate() const {
-  if (height < 2 || luminance.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height))
-    throw InputError("the picture of the sky does not have width x height texels in at least two rows");
+  if (width < 1 || height < 2 || luminance.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height))
+    throw InputError("the picture of the sky does not have width x height texels, in at least one column and two rows");
   for (const float texel : luminance)
     if (!(texel >= 0 && std::isfinite(texel)))
       throw InputError("the picture of the sky holds a value that is negative or not finite");

@@ -220,7 +220,6 @@ class Engine:
         leaves `Frame.components` empty, which is faster. A further picture of the last view, under whatever light, is
         several times as fast as the first: what the camera sees is kept.
         """
-        self._require_light()
         method = _engine.Visibility.VOLUMES if visibility == "volumes" else _engine.Visibility.RAYS
         try:
             result = self._core.render(_core_view(view), method, edge_samples, components, self._sky_picture())

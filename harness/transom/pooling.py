@@ -1,9 +1,10 @@
-"""Adding batches to a finished reference, so that the answer is the one that all batches would have given at once.
+"""Adding batches to a finished reference, so that the answer is the one that all batches would have given at once; or,
+where the integrator has changed between them, the mean of all, which is as right as each.
 
 Batch i depends on the case and on i alone. A stored answer of batches 0 .. n-1 is therefore continued by batches n,
 n+1, ...; of the stored ones it takes their means, halves and standard errors, which is all that pooling needs [Chan,
-Golub and LeVeque 1983]. Stored pictures are half floats: that moves a pixel by at most 2^-11 (0.05 %, 0.02 % on the
-mean) of its value, times the stored share of the batches, whatever is added.
+Golub and LeVeque 1983]. Stored pictures are half floats: each time, that moves a pixel by at most 2^-11 (0.05 %,
+0.02 % on the mean) of its value, times the stored share of the batches.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ MEAN_GROUPS = 64
 """Groups of batches whose means are kept, for the uncertainty of a reference's mean. Batch i is of group i mod 64."""
 
 HALVES_AGREE = 2.0**-9
-"""Relative difference allowed between a stored mean and that of its halves: three roundings to half floats and some."""
+"""Relative difference allowed between a stored mean and that of its halves: two roundings to half floats and some,
+however often batches have been added, since the mean is then that of the halves."""
 
 DARK_CD_M2 = 1e-4
 """The same in cd/m²: half floats below 6e-5 have fewer digits."""
@@ -84,7 +86,7 @@ def pooled_image(before: FinishedBatches, later: ImageResult, count: int) -> Ima
         (luminance(stored.mean), stored.standard_error, n), (luminance(later.mean), later.standard_error, m)
     )
     return ImageResult(
-        _mean(stored.mean, n, later.mean, m).astype(np.float32),
+        _mean(first, sizes[0], second, sizes[1]).astype(np.float32),
         (first.astype(np.float32), second.astype(np.float32)),
         error.astype(np.float32),
         facts=later.facts,
@@ -109,20 +111,31 @@ def group_means(
     """By region, the mean luminance [cd/m²] of each of MEAN_GROUPS groups of batches 0 .. count-1.
 
     before: what is finished of them; the others are in `batches`, arrays `values` (h, w, 3). Batches are independent
-    whatever their pixels have in common, so that the spread of these means is the noise's.
+    whatever their pixels have in common, so that the spread of these means is the noise's. Regions are no part of what
+    a case is: one that was not there before, or was another part of the picture, is left out.
     """
     masks = region_masks(scene, view)
+    if before is not None:
+        masks = {region: mask for region, mask in masks.items() if _is_as_it_was(before, region, mask)}
     groups = min(count, MEAN_GROUPS)
     sums = {region: np.zeros(groups) for region in masks}
     if before is not None:
         sizes = _group_sizes(before.count)
-        for region, means in before.group_means.items():
-            sums[region][: len(sizes)] = sizes * np.asarray(means)
+        for region in masks:
+            sums[region][: len(sizes)] = sizes * np.asarray(before.group_means[region])
     for index in range(batches.first, count):
         values = luminance(batches.load(index)["values"])
         for region, mask in masks.items():
             sums[region][index % MEAN_GROUPS] += values[mask].mean()
     return {region: [float(f"{v:.7g}") for v in total / _group_sizes(count)] for region, total in sums.items()}
+
+
+def _is_as_it_was(before: FinishedBatches, region: str, mask: NDArray[np.bool_]) -> bool:
+    """Whether a region's stored means are those of the same pixels of the stored picture."""
+    if before.image is None or region not in before.group_means:
+        return False
+    stored = np.average(before.group_means[region], weights=_group_sizes(before.count))
+    return bool(np.isclose(luminance(before.image.mean)[mask].mean(), stored, rtol=HALVES_AGREE, atol=DARK_CD_M2))
 
 
 def _mean(one: NDArray[Any], n: int, other: NDArray[Any], m: int) -> Float64:

@@ -12,7 +12,7 @@ from transom.bundle import Store, repository_store
 from transom.known.suite import run_known_references
 from transom.progress import CaseProgress
 from transom.renderer import Renderer, load_renderer
-from transom.run import Question, free_first, reference_questions, render_case
+from transom.run import Question, free_first, reference_questions, render_case, usable_answer
 from transom.suite import is_of_scenes, load_suite, read_suites
 
 REFERENCE_RENDERER = "mitsuba"
@@ -80,9 +80,9 @@ def _run_stage(
 
 
 def _stored_noise(store: Store, question: Question) -> float | None:
-    """Relative standard error [%] of the answer that is stored, or None without one."""
-    found = store.find(question.case)
-    return None if found is None else float(found.record.facts["relative_standard_error_percent"])
+    """Relative standard error [%] of the answer that is stored, or None without one that is whole."""
+    found = usable_answer(question, store)
+    return None if found is None else found.record.facts.get("relative_standard_error_percent")
 
 
 def _work(question: Question, stage: float, stored_percent: float | None) -> float:

@@ -86,13 +86,13 @@ def render_case(
     """
     case, store = question.case, store or cache_store()
     if not fresh:
-        found = _usable(question, store)
-        if found is not None and is_good_enough(found, question):
+        found = usable_answer(question, store)
+        if found is not None and is_done(found, question):
             return found
     with claimed(cache_store().root, case.key, wait=wait):
         # Looked at again: whoever held the claim before may have answered it.
-        found = None if fresh else _usable(question, store)
-        if found is not None and is_good_enough(found, question):
+        found = None if fresh else usable_answer(question, store)
+        if found is not None and is_done(found, question):
             return found
         require_writable(store.root)
         sweep(store.folder(case))
@@ -108,7 +108,7 @@ def render_case(
         return bundle
 
 
-def _usable(question: Question, store: Store) -> Bundle | None:
+def usable_answer(question: Question, store: Store) -> Bundle | None:
     """The answer to a case that is there and whole."""
     with suppress(InputError):  # a malformed record is as good as none: it is about to be replaced
         found = store.find(question.case) or find_bundle(question.case)
@@ -217,17 +217,21 @@ def coarse_options(renderer: Renderer) -> dict[str, Any] | None:
 
 
 def is_good_enough(bundle: Bundle, question: Question) -> bool:
-    """Whether an answer has the batches, and the quiet, that its question asks for, or can have no more batches."""
+    """Whether an answer has the batches, and the quiet, that its question asks for."""
     target, facts = question.target, bundle.record.facts
     if target is None:
         return True
-    batches = int(facts.get("batches", LEAST_BATCHES))
-    if batches > target.max_batches - LEAST_ADDED:
-        return True
-    if batches < _least_batches(target):
+    if int(facts.get("batches", LEAST_BATCHES)) < _least_batches(target):
         return False
     # 2 % of slack: a second estimate of the same noise differs a little from the one that stopped the rendering.
     return float(facts.get("relative_standard_error_percent", 0.0)) <= 1.02 * target.percent
+
+
+def is_done(bundle: Bundle, question: Question) -> bool:
+    """Whether an answer is good enough, or can have no more batches."""
+    if question.target is None or is_good_enough(bundle, question):
+        return True
+    return int(bundle.record.facts.get("batches", LEAST_BATCHES)) > question.target.max_batches - LEAST_ADDED
 
 
 def _render_in_batches(
@@ -289,7 +293,10 @@ def _first_order(question: Question, found: Bundle | None) -> int:
 
 
 def _next_order(count: int, percent: float, target: Target) -> int:
-    """How many batches the target should need, an even number, when `count` of them have a noise of `percent`."""
+    """How many batches the target should need when `count` of them have a noise of `percent`.
+
+    Even where `count` and the most that may be are.
+    """
     growth = min(1.02 * (percent / target.percent) ** 2, GREATEST_GROWTH)
     return min(max(count + LEAST_ADDED, math.ceil(count * growth / 2) * 2), target.max_batches)
 

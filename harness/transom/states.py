@@ -13,7 +13,7 @@ from transom.claims import holder, queued
 from transom.errors import InputError
 from transom.failures import FailureRecord, read_failure
 from transom.renderer import load_renderer
-from transom.run import Question, engine_questions, is_good_enough, reference_questions
+from transom.run import Question, engine_questions, is_done, is_good_enough, reference_questions
 from transom.suite import Suite
 from transom.workflow import ENGINE, VISIBILITIES
 
@@ -87,7 +87,7 @@ def _state(question: Question, coming: frozenset[str]) -> CaseState:
         return CaseState(question, State.FAILED, _failure_words(failure))
     if found is not None and not found.is_whole():
         return CaseState(question, State.FAILED, f"{found.folder.name} is damaged; the next run renders it again")
-    if found is not None and (case.key not in coming or is_good_enough(found, question)):
+    if found is not None and (case.key not in coming or is_done(found, question)):
         return CaseState(question, State.DONE, _answer_words(found, question))
     if case.key in coming:
         return CaseState(question, State.QUEUED)

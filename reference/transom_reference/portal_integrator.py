@@ -4,7 +4,8 @@ At every diffuse vertex x these are added, and a cosine-distributed ray finds th
 - the sun, by a shadow ray; its patches seen by the next ray count with a weight against the connections below;
 - sky and ground, by a point on an opening, chosen by an estimate of each opening's light at x;
 - one point y lit by the sun through an opening, chosen from a list that is traced from the openings once a batch;
-- indoors, one light vertex: a place where a light path from the openings has landed (light_vertices.py);
+- indoors, four light vertices, places where light paths from the openings have landed (light_vertices.py), each the
+  better of two by what it would bring if it is visible;
 - one point source.
 Sky and sun patches are weighted against the cosine-distributed ray by the balance heuristic [Veach 1997, ch. 9], with
 the densities of all openings that a ray crosses, so that rays through two panes are right. All other light from indoor

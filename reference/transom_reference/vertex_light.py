@@ -201,7 +201,8 @@ class VertexLight:
 
     def _connected(self, here: Vertex, choice: Any, number: Any, connection: int) -> Any:
         """What one connection brings. The candidates of all are from equal parts of the vertices, which lie in order of
-        place, each connection's as far apart as can be; its number for choosing among them is a turn of the others'."""
+        place, each connection's as far apart as can be. All choose by one random number, turned by
+        connection / VERTEX_CONNECTIONS modulo 1."""
         vertices = self.batch.vertices
         assert vertices is not None
         may = here.active & here.indoors

@@ -126,9 +126,9 @@ TEST(Condition, LightThatIsNoNumberIsRefused) {
 TEST(SkyPicture, WhatIsNoPictureIsRefused) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const SkyPicture dark{{0, 0, 0, 0}, 2, 2}, broken{{1, 1, nan, 1}, 2, 2}, negative{{1, 1, -1, 1}, 2, 2},
-      flat{{1, 1, 1, 1}, 4, 1}, small{{1, 1, 1}, 2, 2};
+      flat{{1, 1, 1, 1}, 4, 1}, small{{1, 1, 1}, 2, 2}, empty{{}, 0, 2};
   EXPECT_NO_THROW(dark.validate());
-  for (const SkyPicture& bad : {broken, negative, flat, small}) EXPECT_THROW(bad.validate(), InputError);
+  for (const SkyPicture& bad : {broken, negative, flat, small, empty}) EXPECT_THROW(bad.validate(), InputError);
 }
 
 TEST(View, PlaceThatIsNoNumberIsRefused) {

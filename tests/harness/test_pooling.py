@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,10 +13,11 @@ from harness_fakes import NoisyRenderer, small_condition, small_scene
 
 from transom import pooling, run, visible
 from transom.bundle import Bundle, Case, cache_store, make_case, read_bundle, repository_store
+from transom.colour import luminance
 from transom.errors import InputError
 from transom.images import read_exr, write_exr
 from transom.renderer import ImageResult
-from transom.run import Question, Target, is_good_enough, render_case
+from transom.run import Question, Target, is_done, is_good_enough, render_case
 from transom.scene.model import Scene, View
 from transom.sensor_file import scene_sensors
 from transom.visible import FirstSurfaces
@@ -88,6 +88,34 @@ def test_extended_picture_is_the_one_rendered_in_one_go(first: float, second: fl
         np.testing.assert_allclose(groups[region], expected[region], rtol=1e-6)
 
 
+def test_many_small_additions_stay_in_agreement_with_themselves() -> None:
+    """Rounding to half floats each time adds up in the halves and in the mean alike."""
+    case = image_case(NoisyRenderer())
+    for most in range(32, 72, 2):
+        bundle = render_case(NoisyRenderer(), Question(case, Target(0.1, max_batches=most)), repository_store())
+        assert bundle.record.facts["batches"] == most
+        assert pooling.finished_batches(bundle, case).count == most
+    np.testing.assert_allclose(bundle.image().mean, at_once(case, most).image().mean, rtol=5 * HALF_FLOAT)
+
+
+def test_region_that_has_changed_since_has_no_group_means(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Regions are no part of a case's key: what was stored of one may be of other pixels."""
+    case = image_case(NoisyRenderer())
+    left, right = np.zeros((2, 8, 12), bool)
+    left[:, :6], right[:, 6:] = True, True
+    masks = {"kept": left, "moved": left, "gone": right}
+    monkeypatch.setattr(pooling, "region_masks", lambda *_: masks)
+    render_case(NoisyRenderer(), Question(case, Target(9.0)), repository_store())
+    masks = {"kept": left, "moved": right, "new": right}
+    extended = render_case(NoisyRenderer(), Question(case, Target(3.0)), repository_store())
+    assert extended.record.facts["group_means_cd_m2"].keys() == {"kept"}
+    mean = np.average(
+        extended.record.facts["group_means_cd_m2"]["kept"],
+        weights=np.bincount(np.arange(extended.record.facts["batches"]) % pooling.MEAN_GROUPS),
+    )
+    assert mean == pytest.approx(luminance(extended.image().mean)[left].mean(), rel=1e-4)
+
+
 def test_extended_sensors_are_those_measured_in_one_go() -> None:
     case = sensor_case(NoisyRenderer())
     _, extended = in_two_parts(case, 9.0, 2.0)
@@ -144,7 +172,8 @@ def test_answer_with_all_batches_that_it_may_have_is_not_rendered_again() -> Non
     bundle = render_case(NoisyRenderer(), Question(case, target), repository_store())
     assert bundle.record.facts["batches"] == 40
     assert bundle.record.facts["relative_standard_error_percent"] > target.percent
-    assert is_good_enough(bundle, Question(case, target))
+    assert is_done(bundle, Question(case, target))
+    assert not is_good_enough(bundle, Question(case, target))
     again = NoisyRenderer()
     render_case(again, Question(case, target), repository_store())
     assert again.rendered == []
@@ -215,7 +244,7 @@ def test_answer_that_contradicts_itself_is_refused_and_left_as_it_is(
     assert (stored.folder / "run.json").read_bytes() == record
 
 
-def test_damaged_answer_is_no_beginning(tmp_path: Path) -> None:  # noqa: ARG001
+def test_damaged_answer_is_no_beginning() -> None:
     """Its file is not the one that was written: nothing of it gets into the new answer."""
     case = image_case(NoisyRenderer())
     stored = render_case(NoisyRenderer(), Question(case, Target(9.0)), repository_store())

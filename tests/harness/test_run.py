@@ -92,7 +92,7 @@ def test_what_needs_least_comes_first_and_what_is_stored_is_not_needed(renderer:
     renderer.stop_after = 1
     with pytest.raises(KeyboardInterrupt):
         run_references(())
-    assert renderer.rendered == [0], "the sensors, of which nothing is there yet"
+    assert renderer.rendered == [0], "nothing of what is stored"
     finished = repository_store().find(picture.case)
     assert finished is not None
     assert _work(picture, 1.0, 1.5) == 0.0 < _work(picture, 1.0, 2.1) < _work(picture, 1.0, 3.0)

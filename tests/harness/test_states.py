@@ -135,7 +135,7 @@ def test_two_runs_at_once_share_the_cases_between_them(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("scenes")
 def test_running_and_queued_cases_are_told_with_their_process(tmp_path: Path) -> None:
-    process = transom("run", "room", seconds=5.0, cwd=tmp_path)
+    process = transom("run", "room", seconds=60.0, cwd=tmp_path)  # longer than it is looked at, also on a busy machine
     try:
         wait_for(lambda: State.RUNNING in engine_states("room"), process)
         found = engine_states("room")

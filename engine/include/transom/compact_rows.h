@@ -10,7 +10,7 @@
 namespace transom {
 
 /// Values for the columns of compact rows: 11 bits of precision from the largest down to 2^-28 of it; smaller ones are
-/// 0. One channel for grey light, else three and a blank.
+/// 0. One channel for grey light, else three and a blank, which is 0.
 class HalfColours {
  public:
   explicit HalfColours(const std::vector<glm::vec4>& colours);

@@ -117,7 +117,7 @@ class FrameRenderer {
   std::vector<char> is_lit_row_;                                // by beam and row
   std::vector<float> dark_row_;
   std::vector<char> is_edge_;
-  std::vector<std::vector<char>> is_tested_;    // by beam and pixel: at all its samples
+  std::vector<std::vector<char>> is_tested_;    // by beam and pixel, without stencils: at all its samples
   std::vector<std::vector<std::size_t>> ends_;  // by beam and row: pixels in which its light ends
   std::unique_ptr<GlContext> context_;
   std::unique_ptr<ShadowVolumes> volumes_;

@@ -62,8 +62,6 @@ class RayScene {
   /// Transmittance of the opening that a face belongs to, for light along `direction` or against it.
   float opening_transmittance(int face, glm::vec3 direction) const;
 
-  bool has_openings() const { return has_openings_; }
-
   /// The faces that rays of this kind may meet, ascending.
   std::vector<int> faces_of(What what) const;
 

@@ -16,7 +16,7 @@ Int32 = NDArray[np.int32]
 STEEP_ORDER = 4
 STEEP_ANGLE_RAD = math.radians(6)
 """Nodes a bin and direction where the sky is steep, and the angle around the sun within which it is: one hour's
-irradiance of a wall is then right to 1.2e-4 for every CIE sky, and for Perez's from clearness 1 to 9. With 3 x 3 nodes
+irradiance of a wall is then right to 1.1e-4 for every CIE sky, and for Perez's from clearness 1 to 9. With 3 x 3 nodes
 in all bins it is to 1.2e-3."""
 
 TREGENZA_ROW_COUNTS = (30, 30, 24, 24, 18, 12, 6)
