@@ -317,6 +317,7 @@ void Gatherer::add_rays_from_point(const Node& point, const SobolSequence& point
 }
 
 // Casts those rays again that may meet what has changed, in both states. False: their answers do not go together.
+// radius: around `middle`, of where rays begin; 0: all begin there, and origin_of is not asked.
 template <typename OriginOf>
 bool Gatherer::gather_again(const OriginOf& origin_of, const Node& middle, float radius, int count, std::uint32_t seed,
                             Elements told, const Gatherer& before, const SceneChange& change, GatherRow& row) const {

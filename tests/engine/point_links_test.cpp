@@ -46,6 +46,14 @@ struct LitFloor {
     links.add_irradiance(bright, irradiance);
     return irradiance;
   }
+
+  std::vector<glm::vec3> by_connections(FirstBounce::Rays precision = FirstBounce::Rays::kOne) const {
+    const FirstBounce connections(*mesh, *rays, bright);
+    std::vector<glm::vec3> irradiance;
+    for (const Node& point : points)
+      irradiance.push_back(connections.irradiance(point.position, point.normal, precision));
+    return irradiance;
+  }
 };
 
 TEST(PointLinks, APointWithinTheLightOfAPatchStaysFinite) {
@@ -62,11 +70,9 @@ TEST(PointLinks, APointWithinTheLightOfAPatchStaysFinite) {
 TEST(PointLinks, AgreeWithConnectionsWhereNothingStandsBetween) {
   LitFloor floor;
   PointLinks links(*floor.mesh, *floor.rays, floor.points);
-  const FirstBounce connections(*floor.mesh, *floor.rays, floor.bright);
-  const std::vector<glm::vec3> linked = floor.by_links(links);
+  const std::vector<glm::vec3> linked = floor.by_links(links), connected = floor.by_connections();
   for (std::size_t i = 0; i < floor.points.size(); ++i) {
-    const glm::vec3 expected =
-        connections.irradiance(floor.points[i].position, floor.points[i].normal, FirstBounce::Rays::kOne);
+    const glm::vec3 expected = connected[i];
     EXPECT_NEAR(linked[i].x, expected.x, 2e-3f * expected.x + 1e-3f) << i;
     EXPECT_NEAR(linked[i].z, expected.z, 2e-3f * expected.z + 1e-3f) << i;
   }
@@ -112,11 +118,9 @@ TEST(PointLinks, ElementsOfOnePatchMayHaveTheirOwnHues) {
   for (std::size_t k = 0; k < floor.bright.size(); ++k)
     floor.bright[k].radiosity *= k % 2 ? glm::vec3(1, 0.2f, 0) : glm::vec3(0, 0.5f, 1);
   PointLinks links(*floor.mesh, *floor.rays, floor.points);
-  const FirstBounce connections(*floor.mesh, *floor.rays, floor.bright);
-  const std::vector<glm::vec3> linked = floor.by_links(links);
+  const std::vector<glm::vec3> linked = floor.by_links(links), connected = floor.by_connections();
   for (std::size_t i = 0; i < floor.points.size(); ++i) {
-    const glm::vec3 expected =
-        connections.irradiance(floor.points[i].position, floor.points[i].normal, FirstBounce::Rays::kOne);
+    const glm::vec3 expected = connected[i];
     for (int channel = 0; channel < 3; ++channel)
       EXPECT_NEAR(linked[i][channel], expected[channel], 0.01f * (expected.x + expected.y + expected.z) + 1e-3f) << i;
   }
@@ -150,11 +154,10 @@ struct ScreenedFloor : LitFloor {
   // Of what connections with many rays find, by the mean over the points.
   double mean_error() const {
     PointLinks links(*mesh, *rays, points, neighbours);
-    const FirstBounce connections(*mesh, *rays, bright);
-    const std::vector<glm::vec3> linked = by_links(links);
+    const std::vector<glm::vec3> linked = by_links(links), connected = by_connections(FirstBounce::Rays::kMany);
     double error = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const float expected = connections.irradiance(points[i].position, points[i].normal, FirstBounce::Rays::kMany).y;
+      const float expected = connected[i].y;
       error += std::abs(linked[i].y - expected) / expected / static_cast<double>(points.size());
     }
     return error;

@@ -35,8 +35,11 @@ def test_means_are_taken_within_their_own_bins(subdivision: int) -> None:
     bins = SkyBins(subdivision)
     numbers = np.arange(bins.count)
     assert np.array_equal(bins.index(bins.directions), numbers)
-    found = bins.mean(lambda directions: bins.index(directions).astype(float), np.array([0.6, 0.0, 0.8]))
-    assert found == pytest.approx(numbers, abs=1e-9)
+    for power in (1, 2):  # the squares tell nodes that lie as far to one side as to the other
+        found = bins.mean(
+            lambda directions, power=power: bins.index(directions).astype(float) ** power, np.array([0.6, 0.0, 0.8])
+        )
+        assert found == pytest.approx(numbers.astype(float) ** power, abs=1e-6)
 
 
 def test_means_beside_the_sun_and_at_the_horizon_are_those_of_many_nodes() -> None:
