@@ -66,6 +66,18 @@ TEST(Screens, PlacesOnBothSidesOfAPlaneMayBeHidden) {
   EXPECT_TRUE(screens.may_hide(screens.places(both), 0));
 }
 
+TEST(Screens, WhatIsNearerToAPlaneThanRaysMayBeMovedAsideMayBeHidden) {
+  const ScreenedSpace space;
+  const Screens screens(space.faces, {1}, space.points, ScreenedSpace::kBlock);
+  const Face& face = space.faces.faces[1];
+  const glm::vec3 middle = face.position({0.5f, 0.5f});
+  const float side = glm::dot(space.points[0].position - middle, face.normal) > 0 ? 1.f : -1.f;
+  for (const float offsets : {0.f, 0.5f, 3.f}) {
+    const glm::vec3 place = middle + side * offsets * space.faces.ray_offset() * face.normal;
+    EXPECT_EQ(screens.may_hide(screens.places({&place, 1}), 0), offsets < 1) << offsets;
+  }
+}
+
 TEST(Screens, NoFacesHideNothing) {
   const ScreenedSpace space;
   const Screens screens(space.faces, {}, space.points, ScreenedSpace::kBlock);
