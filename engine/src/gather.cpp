@@ -50,22 +50,12 @@ Gatherer::Gatherer(const LightMesh& mesh, const RayScene& rays, const std::vecto
 
 template <typename OriginOf>
 GatherRow Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, Elements told) const {
-  const SobolSequence points(seed);
-  const std::vector<std::uint32_t>& order = coherent_order(count);
-  Ray rays[kBlock];
+  thread_local std::vector<Ray> rays;
+  rays.clear();
+  add_rays(origin_of, SobolSequence(seed), coherent_order(count), count, rays);
   HemisphereTally tally;
   tally.slots.reserve(static_cast<std::size_t>(count));
-  auto next = order.begin();
-  for (int begin = 0; begin < count; begin += kBlock) {
-    const int size = std::min(kBlock, count - begin);
-    for (int i = 0; i < size; ++i) {
-      while (*next >= static_cast<std::uint32_t>(count)) ++next;
-      const glm::vec4 u = points.point4(*next++);
-      const Origin origin = origin_of(glm::vec2(u.z, u.w));
-      rays[i] = {origin.position, frame_from_normal(origin.normal) * sample_cosine_hemisphere({u.x, u.y})};
-    }
-    add_hits({rays, static_cast<std::size_t>(size)}, told, tally);
-  }
+  add_hits(rays, told, tally);
   return std::move(tally).row(count, mesh_.faces().extent);
 }
 
