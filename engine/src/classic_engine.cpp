@@ -33,21 +33,22 @@ Lighting Engine::direct_classic(Condition condition, const Lighting* previous) c
     lighting.patch_sky.assign(n, glm::vec3(0));
     lighting.panel_radiance.assign(lighting.panel_residual.size(), glm::vec3(0));
     // What lies outdoors is lit without an opening; point sources light everything.
+    const SkyRadiance radiance = sky_radiance(lighting);
     std::vector<int> outdoors;
     for (std::size_t p = 0; p < n; ++p)
       if (!is_interior_[p]) {
         outdoors.push_back(slot_of_patch_[p]);
-        lighting.patch_sky[p] = sky_light(lighting, patch_sky_, p);
+        lighting.patch_sky[p] = patch_sky_.irradiance(p, radiance);
       }
     const std::vector<Beam>& beams = lighting.condition.beams;
     std::vector<LitElement> lit =
-        direct_light_->deposit(beams, direct_light_->receivers(outdoors, {}), hash_seed(options_.seed, kForwardStream));
+        direct_light_->deposit(beams, direct_light_->receivers(outdoors, {}));
     if (!scene_.point_sources.empty()) {
       std::vector<int> indoors;
       for (std::size_t p = 0; p < n; ++p)
         if (is_interior_[p]) indoors.push_back(slot_of_patch_[p]);
       const std::vector<LitElement> more =
-          direct_light_->deposit({}, direct_light_->receivers(indoors, {}), hash_seed(options_.seed, kForwardStream));
+          direct_light_->deposit({}, direct_light_->receivers(indoors, {}));
       lit.insert(lit.end(), more.begin(), more.end());
     }
     for (const LitElement& e : lit) {

@@ -35,9 +35,11 @@ DirectLight::Receivers DirectLight::receivers(const std::vector<int>& slots,
 }
 
 DirectLight::DirectLight(const LightMesh& mesh, const RayScene& rays, const std::vector<PointSource>& sources,
-                         const std::vector<Material>& materials, float small_opening_m2)
+                         const std::vector<Material>& materials, float small_opening_m2, std::uint32_t seed)
     : mesh_(mesh),
       rays_(rays),
+      seed_(seed),
+      patterns_(std::make_unique<const Patterns>(seed)),
       is_convex_(is_convex_room(mesh.faces())),
       is_small_opening_(mesh.faces().faces.size(), 0) {
   for (std::size_t f = 0; f < is_small_opening_.size(); ++f) {
@@ -50,6 +52,8 @@ DirectLight::DirectLight(const LightMesh& mesh, const RayScene& rays, const std:
   for (const PointSource& source : sources)
     sources_.push_back({glm::vec3(source.position - mesh.faces().origin), source.intensity});
 }
+
+DirectLight::~DirectLight() = default;
 
 void DirectLight::beam_transmission(const Beam& beam, std::span<const glm::vec3> points, std::span<float> share) const {
   if (beam.opening >= 0) {
@@ -96,7 +100,7 @@ glm::vec3 DirectLight::illuminance(const std::vector<Beam>& beams, glm::vec3 poi
 
 // Lifted points of some elements of a slot, `samples` each.
 DirectLight::Points DirectLight::points_on(int slot_index, const Corners& corners, std::span<const int> elements,
-                                           std::size_t samples, const Patterns& patterns) const {
+                                           std::size_t samples) const {
   const Slot slot = mesh_.slot(slot_index);
   Points points;
   points.resize(elements.size() * samples);
@@ -107,7 +111,7 @@ DirectLight::Points DirectLight::points_on(int slot_index, const Corners& corner
   const glm::vec3 a = corners[0], ab = corners[1] - a, ac = corners[3] - a, twist = corners[2] - a - ab - ac;
   for (std::size_t n = 0; n < elements.size(); ++n) {
     const int e = elements[n];
-    const Patterns::Pattern pattern = patterns.of(slot_index * per_slot + e);
+    const Patterns::Pattern pattern = patterns_->of(slot_index * per_slot + e);
     const glm::vec2 first(e % edge, e / edge);
     if (is_quad) {
       for (std::size_t i = 0; i < samples; ++i) {
@@ -124,25 +128,25 @@ DirectLight::Points DirectLight::points_on(int slot_index, const Corners& corner
   return points;
 }
 
-void DirectLight::sources_on_slot(int slot_index, const Corners& corners, glm::vec3 normal, const Patterns& patterns,
+void DirectLight::sources_on_slot(int slot_index, const Corners& corners, glm::vec3 normal,
                                   std::vector<glm::vec3>& sum) const {
   std::vector<int> elements(static_cast<std::size_t>(mesh_.elements_per_slot()));
   std::iota(elements.begin(), elements.end(), 0);
-  const Points points = points_on(slot_index, corners, elements, kSourceSamplesPerElement, patterns);
+  const Points points = points_on(slot_index, corners, elements, kSourceSamplesPerElement);
   for (std::size_t i = 0; i < points.size(); ++i)
     sum[i / kSourceSamplesPerElement] +=
         point_source_illuminance(points[i], normal) / static_cast<float>(kSourceSamplesPerElement);
 }
 
 // Faces of a cluster look many ways: each sample asks for the light at its own place.
-void DirectLight::sources_and_beams_on_cluster(const std::vector<Beam>& beams, int slot, std::uint32_t seed,
+void DirectLight::sources_and_beams_on_cluster(const std::vector<Beam>& beams, int slot,
                                                std::vector<glm::vec3>& sum) const {
   const int per_slot = mesh_.elements_per_slot();
   sum.resize(static_cast<std::size_t>(per_slot), glm::vec3(0));
   for (int e = 0; e < per_slot; ++e) {
     const int element = slot * per_slot + e;
     if (!(mesh_.element_area(element) > 0)) continue;
-    const SobolSequence sequence(hash_seed(seed, static_cast<std::uint64_t>(element)));
+    const SobolSequence sequence(hash_seed(seed_, static_cast<std::uint64_t>(element)));
     for (std::uint32_t i = 0; i < kSamplesPerElement; ++i) {
       const Node place = mesh_.place_on_element(element, sequence.point2(i));
       sum[e] += illuminance(beams, place.position, place.normal) / static_cast<float>(kSamplesPerElement);
@@ -151,29 +155,28 @@ void DirectLight::sources_and_beams_on_cluster(const std::vector<Beam>& beams, i
 }
 
 std::vector<LitElement> DirectLight::deposit(const std::vector<Beam>& beams, const Receivers& receivers,
-                                             std::uint32_t seed, BeamPlan* plan) const {
+                                             BeamPlan* plan) const {
   BeamPlan unasked;
   std::vector<LitElement> lit;
   if (beams.empty() && sources_.empty()) return lit;
-  const Patterns patterns(seed);
   const int per_slot = mesh_.elements_per_slot();
   std::vector<std::vector<glm::vec3>> sum(receivers.slots.size());  // by element, or empty
   for (const Beam& beam : beams) {
     if (beam.normal_illuminance == glm::vec3(0)) continue;
     if (beam.opening < 0)
-      add_sun(beam, receivers, patterns, sum, plan ? *plan : unasked);
+      add_sun(beam, receivers, sum, plan ? *plan : unasked);
     else
-      add_lobe(beam, receivers, seed, sum, plan ? *plan : unasked);
+      add_lobe(beam, receivers, sum, plan ? *plan : unasked);
   }
   parallel_indices(receivers.slots.size(), kGrain, [&](std::size_t i) {
-    if (mesh_.is_cluster(receivers.slots[i])) sources_and_beams_on_cluster(beams, receivers.slots[i], seed, sum[i]);
+    if (mesh_.is_cluster(receivers.slots[i])) sources_and_beams_on_cluster(beams, receivers.slots[i], sum[i]);
   });
-  const std::map<int, glm::vec3> sent = send_through_small_openings(beams, seed);
+  const std::map<int, glm::vec3> sent = send_through_small_openings(beams);
   if (!sources_.empty() || !sent.empty())
     parallel_indices(receivers.slots.size(), kGrain, [&](std::size_t i) {
       sum[i].resize(static_cast<std::size_t>(per_slot), glm::vec3(0));
       if (!sources_.empty() && !mesh_.is_cluster(receivers.slots[i]))
-        sources_on_slot(receivers.slots[i], receivers.corners[i], receivers.normals[i], patterns, sum[i]);
+        sources_on_slot(receivers.slots[i], receivers.corners[i], receivers.normals[i], sum[i]);
       const int first = receivers.slots[i] * per_slot;
       for (auto entry = sent.lower_bound(first); entry != sent.end() && entry->first < first + per_slot; ++entry)
         sum[i][entry->first - first] += entry->second;

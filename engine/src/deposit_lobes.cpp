@@ -119,7 +119,7 @@ std::vector<std::size_t> DirectLight::reached_by_lobe(const Beam& lobe, const Re
 }
 
 // Adds a lobe to the light of elements, by receiver.
-void DirectLight::add_lobe(const Beam& lobe, const Receivers& receivers, std::uint32_t seed,
+void DirectLight::add_lobe(const Beam& lobe, const Receivers& receivers,
                            std::vector<std::vector<glm::vec3>>& sum, BeamPlan& plan) const {
   const std::vector<std::size_t> candidates = reached_by_lobe(lobe, receivers);
   plan.patches += static_cast<int>(candidates.size());
@@ -128,7 +128,7 @@ void DirectLight::add_lobe(const Beam& lobe, const Receivers& receivers, std::ui
   parallel_indices(candidates.size(), kGrain, [&](std::size_t k) {
     const std::size_t i = candidates[k];
     std::vector<float> mean;
-    lobe_on_slot(lobe, receivers.slots[i], receivers.corners[i], seed, mean);
+    lobe_on_slot(lobe, receivers.slots[i], receivers.corners[i], mean);
     const glm::vec3 full = lobe.normal_illuminance * glm::dot(lobe.direction_to_source, receivers.normals[i]);
     sum[i].resize(per_slot, glm::vec3(0));
     for (std::size_t e = 0; e < per_slot; ++e) sum[i][e] += mean[e] * full;
@@ -136,7 +136,7 @@ void DirectLight::add_lobe(const Beam& lobe, const Receivers& receivers, std::ui
 }
 
 // Mean share of a lobe on each element of a slot.
-void DirectLight::lobe_on_slot(const Beam& lobe, int slot_index, const Corners& corners, std::uint32_t seed,
+void DirectLight::lobe_on_slot(const Beam& lobe, int slot_index, const Corners& corners,
                                std::vector<float>& mean) const {
   mean.assign(static_cast<std::size_t>(mesh_.elements_per_slot()), 0.f);
   const std::vector<std::vector<glm::vec3>> outlines = element_outlines(slot_index, corners);
@@ -165,7 +165,7 @@ void DirectLight::lobe_on_slot(const Beam& lobe, int slot_index, const Corners& 
       rays.clear();
       for (const LitPart& part : parts) {
         const SobolSequence sequence(
-            hash_seed(seed, static_cast<std::uint64_t>(slot_index) * mesh_.elements_per_slot() + part.element));
+            hash_seed(seed_, static_cast<std::uint64_t>(slot_index) * mesh_.elements_per_slot() + part.element));
         for (std::uint32_t i = 0; i < count; ++i) {
           const glm::vec3 point = point_of(part.corner, sequence.point2(i));
           const float distance = glm::dot(shaft.plane, glm::vec4(point, 1)) / cosine;

@@ -29,8 +29,7 @@ void DirectLight::ignore_small_openings(glm::vec3 direction, const Points& point
 }
 
 // Mean illuminance of elements by the light of small openings: equal parts of it from places all over each.
-std::map<int, glm::vec3> DirectLight::send_through_small_openings(const std::vector<Beam>& beams,
-                                                                  std::uint32_t seed) const {
+std::map<int, glm::vec3> DirectLight::send_through_small_openings(const std::vector<Beam>& beams) const {
   std::map<int, glm::vec3> sent;
   std::vector<glm::vec3> places(kRaysPerSmallOpening);
   std::vector<float> share(kRaysPerSmallOpening);
@@ -44,7 +43,7 @@ std::map<int, glm::vec3> DirectLight::send_through_small_openings(const std::vec
       if (std::abs(cosine) < kGrazingCosine) continue;
       // Off the face along the beam, not along the normal: the way back to the sun is then through that place of it.
       const glm::vec3 beyond = -mesh_.faces().ray_offset() / std::abs(cosine) * beam.direction_to_source;
-      const SobolSequence points(hash_seed(seed, static_cast<std::uint64_t>(f)));
+      const SobolSequence points(hash_seed(seed_, static_cast<std::uint64_t>(f)));
       for (std::uint32_t i = 0; i < kRaysPerSmallOpening; ++i) {
         const glm::vec2 u = points.point2(i);
         places[i] = face.position(face.is_quad ? u : sample_triangle(u)) + beyond;

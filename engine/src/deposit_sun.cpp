@@ -91,9 +91,8 @@ std::vector<DirectLight::SunlitSlot> DirectLight::reached(const Sun& sun, const 
 void DirectLight::sun_transmission(const Sun& sun, const SunlitSlot& slot, const Points& points,
                                    std::span<float> share) const {
   struct Scratch {
-    std::vector<Ray> rays;
+    Points open, along_beam;  // open: from which rays start
     std::vector<std::uint8_t> blocked;
-    Points along_beam;
     std::vector<int> is_behind, is_crossed;
   };
   thread_local Scratch of_thread;
@@ -101,7 +100,7 @@ void DirectLight::sun_transmission(const Sun& sun, const SunlitSlot& slot, const
   const std::size_t count = points.size();
   scratch.is_behind.resize(count);
   scratch.is_crossed.assign(count, slot.is_behind_openings ? 0 : 1);
-  scratch.rays.resize(count);
+  scratch.open.resize(count);
   scratch.blocked.resize(count);
   int *is_behind = scratch.is_behind.data(), *is_crossed = scratch.is_crossed.data();
   sun.outlines.along_beam(points, scratch.along_beam);
@@ -117,13 +116,13 @@ void DirectLight::sun_transmission(const Sun& sun, const SunlitSlot& slot, const
   std::size_t ray_count = 0;
   for (std::size_t i = 0; i < count; ++i) {
     if (!is_crossed[i]) share[i] = 0;
-    if (share[i] > 0) scratch.rays[ray_count++] = {points[i], sun.beam.direction_to_source};
+    if (share[i] > 0) scratch.open.set(ray_count++, points[i]);
   }
   if (is_convex_ && slot.is_behind_openings)
     std::fill_n(scratch.blocked.begin(), ray_count, std::uint8_t{0});
   else
-    rays_.occluded(RayScene::What::kOpaque, {scratch.rays.data(), ray_count}, {scratch.blocked.data(), ray_count},
-                   RayScene::Order::kCoherent);
+    rays_.occluded_along(sun.beam.direction_to_source, scratch.open.x.data(), scratch.open.y.data(),
+                         scratch.open.z.data(), RayScene::What::kOpaque, {scratch.blocked.data(), ray_count});
   for (std::size_t i = 0, next = 0; i < count; ++i)
     if (share[i] > 0 && scratch.blocked[next++]) share[i] = 0;
   ignore_small_openings(sun.beam.direction_to_source, points, share);
@@ -131,14 +130,14 @@ void DirectLight::sun_transmission(const Sun& sun, const SunlitSlot& slot, const
 
 // The few samples that every element of the candidates has: share of a beam, kSamplesPerElement an element.
 std::vector<float> DirectLight::sample_sun(const Sun& sun, const Receivers& receivers,
-                                           const std::vector<SunlitSlot>& candidates, const Patterns& patterns) const {
+                                           const std::vector<SunlitSlot>& candidates) const {
   std::vector<int> elements(static_cast<std::size_t>(mesh_.elements_per_slot()));
   std::iota(elements.begin(), elements.end(), 0);
   const std::size_t samples_per_slot = elements.size() * kSamplesPerElement;
   std::vector<float> share(candidates.size() * samples_per_slot);
   parallel_indices(candidates.size(), kGrain, [&](std::size_t k) {
     const std::size_t i = candidates[k].receiver;
-    const Points points = points_on(receivers.slots[i], receivers.corners[i], elements, kSamplesPerElement, patterns);
+    const Points points = points_on(receivers.slots[i], receivers.corners[i], elements, kSamplesPerElement);
     sun_transmission(sun, candidates[k], points, {&share[k * samples_per_slot], samples_per_slot});
   });
   return share;
@@ -196,8 +195,8 @@ std::vector<int> DirectLight::partly_lit(int slot_index, const std::vector<int>&
 // Adds the sun to the light of elements, by receiver. Elements at the edges of light, as two samples of each tell, are
 // sampled densely; the others keep two samples that did not tell: then the thin shadows that none of them found are, in
 // the mean, made up for.
-void DirectLight::add_sun(const Beam& sun, const Receivers& receivers, const Patterns& patterns,
-                          std::vector<std::vector<glm::vec3>>& sum, BeamPlan& plan) const {
+void DirectLight::add_sun(const Beam& sun, const Receivers& receivers, std::vector<std::vector<glm::vec3>>& sum,
+                          BeamPlan& plan) const {
   const Sun seen(*this, sun);
   const std::vector<SunlitSlot> candidates = reached(seen, receivers);
   plan.facing_openings += static_cast<int>(std::count(seen.lets_in.begin(), seen.lets_in.end(), 1));
@@ -205,7 +204,7 @@ void DirectLight::add_sun(const Beam& sun, const Receivers& receivers, const Pat
   if (candidates.empty()) return;
   ++plan.beams;
   plan.is_unshaded |= is_convex_;
-  const std::vector<float> share = sample_sun(seen, receivers, candidates, patterns);
+  const std::vector<float> share = sample_sun(seen, receivers, candidates);
   std::vector<int> place_of_slot(static_cast<std::size_t>(mesh_.slot_count()), -1);
   for (std::size_t k = 0; k < candidates.size(); ++k)
     place_of_slot[receivers.slots[candidates[k].receiver]] = static_cast<int>(k);
@@ -228,8 +227,7 @@ void DirectLight::add_sun(const Beam& sun, const Receivers& receivers, const Pat
           static_cast<float>(kSamplesPerElement - kTellingSamples);
     const std::vector<int> elements = partly_lit(receivers.slots[i], place_of_slot, share, evenly_lit);
     std::vector<float> refined(elements.size() * kRefinedSamplesPerElement);
-    const Points points =
-        points_on(receivers.slots[i], receivers.corners[i], elements, kRefinedSamplesPerElement, patterns);
+    const Points points = points_on(receivers.slots[i], receivers.corners[i], elements, kRefinedSamplesPerElement);
     sun_transmission(seen, candidates[k], points, refined);
     for (std::size_t n = 0; n < elements.size(); ++n)
       mean[elements[n]] = std::accumulate(&refined[n * kRefinedSamplesPerElement],

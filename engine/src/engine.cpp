@@ -50,10 +50,11 @@ void Engine::solve(const Engine* solved) {
     panels_ = std::make_unique<Panels>(faces_, scene_.materials, scene_.openings);
     gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_, *panels_);
     const float element_edge = facts_.maximum_edge_m / static_cast<float>(options_.elements_per_edge);
+    const std::uint32_t beam_seed = hash_seed(options_.seed, kBeamStream);
     direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources, scene_.materials,
-                                                  element_edge * element_edge);
+                                                  element_edge * element_edge, beam_seed);
     beam_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, std::vector<PointSource>{}, scene_.materials,
-                                                element_edge * element_edge);
+                                                element_edge * element_edge, beam_seed);
   }
   Known known = known_from(solved);
   {
@@ -68,8 +69,10 @@ void Engine::solve(const Engine* solved) {
   }
   {
     const TracePhase phase(trace_, "transfer");
-    assemble_transfer(known);
-    link_panels();
+    SparseRows patch_sky;
+    assemble_transfer(known, patch_sky);
+    link_panels(patch_sky);
+    patch_sky_ = SkyRows(patch_sky, ground_bin());
   }
   if (options_.method == Method::kClassic) {
     const TracePhase phase(trace_, "forward rays");
@@ -77,7 +80,7 @@ void Engine::solve(const Engine* solved) {
   } else {
     {
       const TracePhase phase(trace_, "likeness");
-      lit_by_sources_ = direct_light_->deposit({}, receivers_, hash_seed(options_.seed, kBeamStream));
+      lit_by_sources_ = direct_light_->deposit({}, receivers_);
       find_smooth_lights();
       interreflection_->prepare(smooth_lights_);
     }
@@ -145,7 +148,7 @@ std::vector<Share> Engine::to_patches(const std::vector<Share>& slots) const {
   return patches;
 }
 
-void Engine::assemble_transfer(const Known& known) {
+void Engine::assemble_transfer(const Known& known, SparseRows& patch_sky) {
   const std::size_t n = patch_rows_.size();
   patch_area_.resize(n);
   patch_reflectance_.resize(n);
@@ -165,7 +168,7 @@ void Engine::assemble_transfer(const Known& known) {
     is_behind_openings[p] = is_interior_[p] && row.around->escaped == 0;
     through_.append(to_patches(row.beyond->through));
     facts_.kept_patch_rows += known.patch(slot_of_patch_[p]) >= 0;
-    patch_sky_.append(row.beyond->sky);
+    patch_sky.append(row.beyond->sky);
   }
   receivers_ = beam_light_->receivers(slot_of_patch_, std::move(is_behind_openings));
   double emitting = 0, interior = 0;
@@ -205,8 +208,7 @@ void Engine::find_smooth_lights() {
   const std::vector<glm::vec3> nothing(n, glm::vec3(0));
   std::vector<glm::vec3> from_sky = nothing, from_lamps = nothing;
   for (std::size_t p = 0; p < n; ++p)
-    for (std::size_t k = patch_sky_.begin[p]; k < patch_sky_.begin[p + 1]; ++k)
-      from_sky[p] += glm::vec3(patch_sky_.entries[k].weight);
+    for (const Share& share : patch_sky_.row(p)) from_sky[p] += glm::vec3(share.weight);
   for (const LitElement& e : lit_by_sources_) {
     const int per_slot = mesh_->elements_per_slot(), patch = patch_of_slot_[e.element / per_slot];
     from_lamps[patch] += e.illuminance * element_share_[patch * per_slot + e.element % per_slot];
@@ -229,14 +231,12 @@ void Engine::find_smooth_lights() {
 
 // Patches that a beam may light: they see some of the sky.
 std::vector<int> Engine::beam_slots() const {
-  const int ground = sky_index_->count() - 1;
   std::vector<int> slots;
   for (std::size_t p = 0; p < slot_of_patch_.size(); ++p) {
     if (patch_reflectance_[p] == glm::vec3(0)) continue;
-    bool sees_sky = false;
-    for (std::size_t k = patch_sky_.begin[p]; k < patch_sky_.begin[p + 1] && !sees_sky; ++k)
-      sees_sky = patch_sky_.entries[k].index != ground;
-    if (sees_sky) slots.push_back(slot_of_patch_[p]);
+    const std::vector<Share> sky = patch_sky_.row(p);
+    if (std::any_of(sky.begin(), sky.end(), [&](const Share& share) { return share.index != ground_bin(); }))
+      slots.push_back(slot_of_patch_[p]);
   }
   return slots;
 }

@@ -15,19 +15,11 @@ constexpr int kShownCycle = 1;  // of interreflection: less than 1 % of the flux
 
 }  // namespace
 
-// Rows are sorted: sky bins come first.
-glm::vec3 Engine::sky_light(const Lighting& lighting, const SparseRows& rows, std::size_t row) const {
+SkyRadiance Engine::sky_radiance(const Lighting& lighting) const {
   const Condition& condition = lighting.condition;
-  const int ground = sky_index_->count() - 1;
-  const std::size_t begin = rows.begin[row];
-  std::size_t end = rows.begin[row + 1];
-  glm::vec3 sum(0);
-  for (; end > begin && rows.entries[end - 1].index >= ground; --end) {
-    const Share& share = rows.entries[end - 1];
-    sum += share.weight *
-           (share.index == ground ? condition.ground_luminance : lighting.panel_radiance[share.index - ground - 1]);
-  }
-  return sum + rows.dot_of(begin, end, condition.sky_luminance) * condition.sky_colour;
+  SkyRadiance radiance{condition.sky_luminance, condition.sky_colour, {glm::vec4(condition.ground_luminance, 0)}};
+  for (const glm::vec3& panel : lighting.panel_radiance) radiance.beyond.push_back(glm::vec4(panel, 0));
+  return radiance;
 }
 
 // What points are connected to for the light that falls on elements.
@@ -58,8 +50,7 @@ Lighting Engine::direct_light_of(Condition condition) const {
   lighting.plan.is_grey = is_grey(lighting.condition);
   {
     const TracePhase phase(trace_, "beams");
-    lighting.lit_elements = beam_light_->deposit(lighting.condition.beams, receivers_,
-                                                 hash_seed(options_.seed, kBeamStream), &lighting.plan.beams);
+    lighting.lit_elements = beam_light_->deposit(lighting.condition.beams, receivers_, &lighting.plan.beams);
     lighting.beam_lit_count = lighting.lit_elements.size();
     lighting.lit_elements.insert(lighting.lit_elements.end(), lit_by_sources_.begin(), lit_by_sources_.end());
     lighting.bright_elements = bright_elements({lighting.lit_elements.data(), lighting.beam_lit_count});
@@ -89,10 +80,11 @@ void Engine::find_sky_light(Lighting& lighting) const {
   const TracePhase phase(trace_, "sky");
   lighting.patch_sky.resize(patch_sky_.row_count());
   lighting.node_sky.resize(node_sky_.row_count());
+  const SkyRadiance radiance = sky_radiance(lighting);
   parallel_indices(lighting.patch_sky.size(), 64,
-                   [&](std::size_t p) { lighting.patch_sky[p] = sky_light(lighting, patch_sky_, p); });
+                   [&](std::size_t p) { lighting.patch_sky[p] = patch_sky_.irradiance(p, radiance); });
   parallel_indices(lighting.node_sky.size(), 64,
-                   [&](std::size_t i) { lighting.node_sky[i] = sky_light(lighting, node_sky_, i); });
+                   [&](std::size_t i) { lighting.node_sky[i] = node_sky_.irradiance(i, radiance); });
 }
 
 // The first state of a relighting: its own direct light, and the indirect light of another, or none.
@@ -135,27 +127,26 @@ std::vector<glm::vec4> Engine::sent_by_nodes_and_patches(const Lighting& lightin
   return sent;
 }
 
-HalfColours Engine::smooth_light_of_patches(const Lighting& lighting) const {
-  const std::vector<glm::vec3>& radiosity = lighting.patch_smooth_radiosity;
-  if (!lighting.plan.is_grey) {
-    std::vector<glm::vec4> colours(radiosity.size());
-    for (std::size_t p = 0; p < radiosity.size(); ++p) colours[p] = glm::vec4(radiosity[p], 0);
-    return HalfColours(colours);
-  }
-  std::vector<float> greys(radiosity.size());
-  for (std::size_t p = 0; p < radiosity.size(); ++p) greys[p] = radiosity[p].x;
-  return HalfColours(greys);
-}
-
 // Indirect light at nodes, from the irradiance of patches.
 void Engine::gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& first_reflection) const {
   const TracePhase phase(trace_, "gather");
   find_smooth_radiosity(lighting);
   lighting.node_indirect.resize(first_reflection.size());
-  const HalfColours sent_by_patches = smooth_light_of_patches(lighting);
-  parallel_indices(first_reflection.size(), 64, [&](std::size_t i) {
-    lighting.node_indirect[i] = first_reflection[i] + node_patches_.dot(i, sent_by_patches);
-  });
+  const std::vector<glm::vec3>& radiosity = lighting.patch_smooth_radiosity;
+  const auto gather = [&](const auto& sent_by_patches) {
+    parallel_indices(first_reflection.size(), 64, [&](std::size_t i) {
+      lighting.node_indirect[i] = first_reflection[i] + glm::vec3(node_patches_.dot(i, sent_by_patches));
+    });
+  };
+  if (lighting.plan.is_grey) {
+    std::vector<float> greys(radiosity.size());
+    for (std::size_t p = 0; p < radiosity.size(); ++p) greys[p] = radiosity[p].x;
+    gather(greys);
+  } else {
+    std::vector<glm::vec4> colours(radiosity.size());
+    for (std::size_t p = 0; p < radiosity.size(); ++p) colours[p] = glm::vec4(radiosity[p], 0);
+    gather(colours);
+  }
   // What is seen close by is not as even as its patch: the nodes on it, as they are now, speak for it.
   const std::vector<glm::vec4> sent = sent_by_nodes_and_patches(lighting);
   parallel_indices(first_reflection.size(), 64,
@@ -216,8 +207,8 @@ Sensors Engine::sensors(const std::vector<glm::dvec3>& points, const std::vector
     rows[i].reached = to_patches(rows[i].reached);
     if (nodes_) resolved[i] = resolved_by_nodes(rows[i].near);
   });
+  sensors.sky = SkyRows(SparseRows::of(rows, &GatherRow::sky), ground_bin());
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    sensors.sky.append(rows[i].sky);
     sensors.patches.append(rows[i].reached);
     sensors.resolved.append(resolved[i]);
   }
@@ -228,11 +219,12 @@ std::vector<Irradiance> Engine::illuminance(const Lighting& lighting, const Sens
   std::vector<Irradiance> result(sensors.nodes.size());
   const FirstBounce first_bounce(*mesh_, *rays_, lighting.bright_elements);
   const std::vector<glm::vec4> sent = sent_by_nodes_and_patches(lighting);
+  const SkyRadiance radiance = sky_radiance(lighting);
   const std::vector<Beam> beams = lighting.condition.beams_at_points();
   parallel_indices(result.size(), 1, [&](std::size_t i) {
     const Node& node = sensors.nodes[i];
     result[i].direct = direct_light_->illuminance(beams, node.position, node.normal);
-    result[i].sky = sky_light(lighting, sensors.sky, i);
+    result[i].sky = sensors.sky.irradiance(i, radiance);
     result[i].indirect = first_bounce.irradiance(node.position, node.normal, FirstBounce::Rays::kMany) +
                          sensors.patches.dot(i, lighting.patch_smooth_radiosity) +
                          glm::vec3(sensors.resolved.dot(i, sent));

@@ -195,7 +195,7 @@ void Engine::resolve_near_light(const NodeTrial& trial) {
   });
   std::vector<std::vector<Share>> rows(nodes_->nodes().size());
   parallel_indices(rows.size(), kGrain, [&](std::size_t i) { rows[i] = resolved_by_nodes(trial.rows[i].near); });
-  node_near_ = SparseRows::of(rows);
+  node_near_ = ExactRows(SparseRows::of(rows));
 }
 
 // Whether light may change within a part otherwise than linearly, so that it is worth a node in its middle.
@@ -287,7 +287,7 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
   known.has_same_nodes = known.has_same_faces() && nodes_->nodes() == known.engine->nodes_->nodes();
   node_patches_ = CompactRows(SparseRows::of(trial.patches));
   trial.patches.clear();
-  node_sky_ = SparseRows::of(trial.rows, &GatherRow::sky);
+  node_sky_ = SkyRows(SparseRows::of(trial.rows, &GatherRow::sky), ground_bin());
   const auto found = std::make_shared<NodeRows>();
   found->reached = SparseRows::of(trial.rows, &GatherRow::reached);
   found->through = SparseRows::of(trial.rows, &GatherRow::through);

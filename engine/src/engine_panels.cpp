@@ -48,23 +48,21 @@ void Engine::gather_panels() {
   facts_.panel_bin_count = panels_->bin_count();
 }
 
-void Engine::link_panels() {
-  for (const GatherRow& row : panel_rows_) {
-    panel_sky_.append(row.sky);
-    panel_patches_.append(to_patches(row.through));
-  }
+void Engine::link_panels(SparseRows& patch_sky) {
+  panel_sky_ = SkyRows(SparseRows::of(panel_rows_, &GatherRow::sky), ground_bin());
+  for (const GatherRow& row : panel_rows_) panel_patches_.append(to_patches(row.through));
   panel_rows_.clear();
-  balance_panels();
+  balance_panels(patch_sky);
 }
 
 // A room is closed: all that a panel sends into a bin arrives at patches. Their weights are scaled by bins until that
 // holds, as form factors are by rows.
-void Engine::balance_panels() {
+void Engine::balance_panels(SparseRows& patch_sky) const {
   const std::size_t first = static_cast<std::size_t>(sky_index_->count());
   std::vector<double> arrived(static_cast<std::size_t>(panels_->bin_count()), 0.0);
-  for (std::size_t p = 0; p < patch_sky_.row_count(); ++p)
-    for (std::size_t k = patch_sky_.begin[p]; k < patch_sky_.begin[p + 1]; ++k) {
-      const Share& share = patch_sky_.entries[k];
+  for (std::size_t p = 0; p < patch_sky.row_count(); ++p)
+    for (std::size_t k = patch_sky.begin[p]; k < patch_sky.begin[p + 1]; ++k) {
+      const Share& share = patch_sky.entries[k];
       if (static_cast<std::size_t>(share.index) >= first)
         arrived[static_cast<std::size_t>(share.index) - first] += static_cast<double>(patch_area_[p] * share.weight);
     }
@@ -79,7 +77,7 @@ void Engine::balance_panels() {
         scale[number] = static_cast<float>(std::clamp(sent / arrived[number], 1 / kMostScale, kMostScale));
     }
   }
-  for (Share& share : patch_sky_.entries)
+  for (Share& share : patch_sky.entries)
     if (static_cast<std::size_t>(share.index) >= first)
       share.weight *= scale[static_cast<std::size_t>(share.index) - first];
 }
@@ -157,8 +155,9 @@ double Engine::find_panel_radiance(const std::vector<glm::vec3>& radiosity, Ligh
   const std::vector<glm::vec3> before = std::move(lighting.panel_radiance);
   lighting.panel_radiance = lighting.panel_residual;
   std::vector<glm::vec3> arriving(lighting.panel_residual.size());
+  const SkyRadiance sky = sky_radiance(lighting);
   parallel_indices(arriving.size(), 16, [&](std::size_t i) {
-    arriving[i] = sky_light(lighting, panel_sky_, i);
+    arriving[i] = panel_sky_.irradiance(i, sky);
     if (!radiosity.empty()) arriving[i] += panel_patches_.dot(i, radiosity);
   });
   double change = 0, total = 0;

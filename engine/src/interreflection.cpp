@@ -123,10 +123,14 @@ void Interreflection::find_operators() {
     system.row(c) -= std::min({rho.x, rho.y, rho.z}) * exchange.row(c);
   }
   const Matrix solved = exchange * system.partialPivLu().inverse();
-  operator_.assign(solved.data(), solved.data() + solved.size());
   // A room that loses nothing has no such operator: then the patches go on alone.
-  if (!std::all_of(operator_.begin(), operator_.end(), [](float value) { return std::isfinite(value); }))
-    operator_.assign(operator_.size(), 0.f);
+  SparseRows rows;
+  for (Eigen::Index c = 0; c < m; ++c) {
+    if (solved.allFinite())
+      for (Eigen::Index k = 0; k < m; ++k) rows.entries.push_back({static_cast<int>(k), solved(c, k)});
+    rows.begin.push_back(rows.entries.size());
+  }
+  operator_ = ExactRows(rows);
 }
 
 void Interreflection::prepare(std::span<const std::vector<float>> smooth_lights) {
@@ -173,11 +177,7 @@ void Interreflection::cluster_means(const std::vector<Value>& values, std::vecto
 // What clusters receive of what they have not yet reflected.
 template <typename Value>
 void Interreflection::apply_operator(const std::vector<Value>& mean, std::vector<Value>& received) const {
-  parallel_indices(mean.size(), 32, [&](std::size_t c) {
-    Value all(0);
-    for (std::size_t k = 0; k < mean.size(); ++k) all += operator_[c * mean.size() + k] * mean[k];
-    received[c] = all;
-  });
+  parallel_indices(mean.size(), 32, [&](std::size_t c) { received[c] = operator_.dot(c, mean); });
 }
 
 // What is left over before anything has been reflected. Of bright patches it is the first reflection of what they send,
@@ -239,8 +239,7 @@ void Interreflection::carry_on(const std::vector<Value>& left, std::vector<Value
     if (cycle == inner_cycles_) break;
     for (std::size_t c = 0; c < m; ++c) before[c] = mean[c] + to(Value(), cluster_reflectance_[c]) * carried[c];
     groups_.append_means(sum);
-    const HalfColours sent(sum);
-    parallel_indices(n, kGrain, [&](std::size_t i) { received[i] = to(Value(), likeness_.dot(i, sent)); });
+    parallel_indices(n, kGrain, [&](std::size_t i) { received[i] = likeness_.dot(i, sum); });
     for (std::size_t i = 0; i < n; ++i) sum[i] = left[i] + to(Value(), reflectance_[i]) * received[i];
   }
   for (std::size_t i = 0; i < n; ++i) radiosity[i] += sum[i];

@@ -116,6 +116,9 @@ void PointLinks::add_far(const Hue& hue, std::size_t first_block, std::size_t la
     if (patch->is_even && link.weight.empty()) continue;
     const float scale = link.weight_unit * patch->radiosity;
     auto block = std::lower_bound(link.block.begin(), link.block.end(), static_cast<int>(first_block));
+    auto partial = std::lower_bound(
+        link.partial.begin(), patch->is_even ? link.partial.begin() : link.partial.end(), base,
+        [](const Partial& before, std::size_t point) { return static_cast<std::size_t>(before.point) < point; });
     for (; block != link.block.end() && *block < static_cast<int>(last_block); ++block) {
       const std::size_t from = static_cast<std::size_t>(*block) * kBlock,
                         place = static_cast<std::size_t>(block - link.block.begin()) * kBlock;
@@ -124,28 +127,25 @@ void PointLinks::add_far(const Hue& hue, std::size_t first_block, std::size_t la
         const std::uint16_t* known = &link.weight[place];
         for (std::size_t k = 0; k < kBlock; ++k) to[k] += scale * static_cast<float>(static_cast<int>(known[k]));
       } else {
-        add_uneven_block(*patch, place, from, to);
+        add_uneven_block(*patch, place, from, partial, to);
       }
     }
   }
 }
 
-// What an unevenly lit patch sends to the far points of a block; place: of the block in the link.
-void PointLinks::add_uneven_block(const LitPatch& patch, std::size_t place, std::size_t from, float* received) const {
+// What an unevenly lit patch sends to the far points of a block; place: of the block in the link. partial: the first of
+// the link that may be of the block; the first after it when this returns.
+void PointLinks::add_uneven_block(const LitPatch& patch, std::size_t place, std::size_t from,
+                                  std::vector<Partial>::const_iterator& partial, float* received) const {
   const Link& link = *patch.link;
   const glm::vec3 c = patch.centroid, m = patch.normal;
   const float flux = patch.flux;
   const std::uint8_t* seen = &link.seen[place];
   float share[kBlock];
   for (std::size_t k = 0; k < kBlock; ++k) share[k] = flux * seen_share(seen[k]);
-  if (!link.partial.empty()) {
-    const auto is_before = [](const Partial& partial, std::size_t point) {
-      return static_cast<std::size_t>(partial.point) < point;
-    };
-    auto partial = std::lower_bound(link.partial.begin(), link.partial.end(), from, is_before);
-    for (; partial != link.partial.end() && static_cast<std::size_t>(partial->point) < from + kBlock; ++partial)
-      share[static_cast<std::size_t>(partial->point) - from] *= patch.share_of(partial->groups);
-  }
+  while (partial != link.partial.end() && static_cast<std::size_t>(partial->point) < from) ++partial;
+  for (; partial != link.partial.end() && static_cast<std::size_t>(partial->point) < from + kBlock; ++partial)
+    share[static_cast<std::size_t>(partial->point) - from] *= patch.share_of(partial->groups);
   for (std::size_t k = 0; k < kBlock; ++k) received[k] += share[k] * point_weight(c, m, from + k);
 }
 

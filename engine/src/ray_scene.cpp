@@ -279,6 +279,28 @@ void RayScene::occluded(What what, std::span<const Ray> rays, std::span<std::uin
   }
 }
 
+void RayScene::occluded_along(glm::vec3 direction, const float* x, const float* y, const float* z, What what,
+                              std::span<std::uint8_t> blocked) const {
+  const Tree& tree = *trees_[static_cast<std::size_t>(what)];
+  alignas(64) int valid[kWidth];
+  RTCRay16 packet;
+  const Ray ray{{}, direction};
+  load_rays({&ray, 1}, packet, valid);
+  for (std::size_t begin = 0; begin < blocked.size(); begin += kWidth) {
+    const std::size_t count = std::min(kWidth, blocked.size() - begin);
+    for (std::size_t i = 0; i < kWidth; ++i) {
+      const std::size_t k = begin + std::min(i, count - 1);
+      valid[i] = i < count ? -1 : 0;
+      packet.org_x[i] = x[k];
+      packet.org_y[i] = y[k];
+      packet.org_z[i] = z[k];
+      packet.tfar[i] = ray.t_far;
+    }
+    occluded16(valid, tree.scene, &packet, Order::kCoherent);
+    for (std::size_t i = 0; i < count; ++i) blocked[begin + i] = packet.tfar[i] < 0;
+  }
+}
+
 void RayScene::transmittance(std::span<const Ray> rays, std::span<float> shares, Order order) const {
   constexpr int kMaximumCrossings = 64;
   std::fill(shares.begin(), shares.end(), 1.f);

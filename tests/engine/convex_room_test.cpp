@@ -65,8 +65,8 @@ TEST(ConvexRoom, LightIsBitByBitThatFoundByRays) {
       const float azimuth = 0.7f * static_cast<float>(k), height = 0.05f + 0.09f * static_cast<float>(k % 11);
       const Beam beam{glm::normalize(glm::vec3(std::cos(azimuth), std::sin(azimuth), height)), glm::vec3(1000)};
       BeamPlan plan;
-      const std::vector<LitElement> skipped = light.deposit({beam}, behind, 1, &plan),
-                                    traced = light.deposit({beam}, anywhere, 1);
+      const std::vector<LitElement> skipped = light.deposit({beam}, behind, &plan),
+                                    traced = light.deposit({beam}, anywhere);
       ASSERT_EQ(skipped.size(), traced.size()) << k;
       EXPECT_EQ(plan.is_unshaded, plan.beams > 0);
       for (std::size_t i = 0; i < traced.size(); ++i) {

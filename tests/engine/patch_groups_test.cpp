@@ -4,8 +4,6 @@
 
 #include <numeric>
 
-#include "transom/compact_rows.h"
-#include "transom/sampling.h"
 
 namespace transom {
 namespace {
@@ -81,105 +79,6 @@ TEST(PatchGroups, WithoutPatchesThereAreNoGroups) {
   const PatchGroups none({}, {});
   EXPECT_EQ(none.group_count(), 0);
   EXPECT_TRUE(none.grouped({}, {}, {}, 1).empty());
-}
-
-// Rows of random length over many columns, and values for these.
-struct RandomRows {
-  SparseRows rows;
-  std::vector<glm::vec4> values;
-
-  explicit RandomRows(int column_count) {
-    const SobolSequence sequence(5);
-    std::uint32_t next = 0;
-    for (int r = 0; r < 50; ++r) {
-      std::vector<Share> row;
-      for (int k = 0; k < 3 * r; ++k) {
-        const glm::vec2 u = sequence.point2(next++);
-        row.push_back({static_cast<int>(u.x * static_cast<float>(column_count)), 1e-6f + u.y});
-      }
-      rows.append(row);
-    }
-    for (int c = 0; c < column_count; ++c)
-      values.push_back(glm::vec4(0.01f * static_cast<float>(c + 1), 1e4f, -2.f - static_cast<float>(c % 5), 0));
-  }
-};
-
-TEST(CompactRows, FindWhatSparseRowsFindToTheirPrecision) {
-  for (const int columns : {7, 3000, 70000}) {
-    const RandomRows random(columns);
-    const CompactRows compact(random.rows);
-    const HalfColours halves(random.values);
-    ASSERT_EQ(compact.row_count(), random.rows.row_count());
-    for (std::size_t r = 0; r < compact.row_count(); ++r) {
-      const glm::vec4 expected = random.rows.dot(r, random.values);
-      const glm::vec3 found = compact.dot(r, halves);
-      for (int channel = 0; channel < 3; ++channel)
-        EXPECT_NEAR(found[channel], expected[channel], 2e-3f * std::abs(expected[channel])) << columns << " " << r;
-    }
-    EXPECT_NEAR(compact.dot(49, halves).y / random.rows.dot(49, random.values).y, 1, columns > 7 ? 5e-5 : 5e-4);
-  }
-}
-
-TEST(ExactRows, FindWhatSparseRowsFindBitByBit) {
-  for (const int columns : {7, 3000, 70000}) {
-    const RandomRows random(columns);
-    const ExactRows exact(random.rows);
-    std::vector<float> greys;
-    for (const glm::vec4& value : random.values) greys.push_back(value.y);
-    for (std::size_t r = 0; r < random.rows.row_count(); ++r) {
-      EXPECT_EQ(exact.dot(r, random.values), random.rows.dot(r, random.values)) << columns << " " << r;
-      EXPECT_EQ(exact.dot(r, greys), random.rows.dot(r, greys)) << columns << " " << r;
-    }
-  }
-}
-
-TEST(CompactRows, KeepTheSumOfARow) {
-  for (const int columns : {7, 3000}) {
-    const RandomRows random(columns);
-    const CompactRows compact(random.rows);
-    const HalfColours ones(std::vector<float>(random.values.size(), 1.f));
-    for (std::size_t r = 0; r < compact.row_count(); ++r) {
-      double sum = 0;
-      for (const Share& share : random.rows.row(r)) sum += static_cast<double>(share.weight);
-      EXPECT_NEAR(compact.dot(r, ones).x, sum, 1e-6 * sum) << columns << " " << r;
-    }
-  }
-}
-
-TEST(CompactRows, GreyIsEachOfThreeEqualChannels) {
-  RandomRows random(500);
-  std::vector<float> greys;
-  for (glm::vec4& value : random.values) {
-    value = glm::vec4(glm::vec3(value.z), 0);
-    greys.push_back(value.x);
-  }
-  const CompactRows compact(random.rows);
-  for (std::size_t r = 0; r < compact.row_count(); ++r) {
-    const glm::vec3 colour = compact.dot(r, HalfColours(random.values));
-    EXPECT_FLOAT_EQ(compact.dot(r, HalfColours(greys)).x, colour.x);
-    EXPECT_EQ(colour.x, colour.z);
-  }
-}
-
-TEST(CompactRows, AValueThatAllColumnsHaveIsKept) {
-  // Rounded to nearest, all of 1.00024 would be off alike.
-  RandomRows random(3000);
-  float sum = 0;
-  for (const Share& share : random.rows.row(49)) sum += share.weight;
-  for (const float value : {1.00024f, 3e-7f, 2.9e8f}) {
-    const std::vector<float> greys(random.values.size(), value);
-    EXPECT_NEAR(CompactRows(random.rows).dot(49, HalfColours(greys)).x / (sum * value), 1, 5e-5);
-  }
-}
-
-TEST(CompactRows, SmallValuesBesideALargeOneKeepTheirPrecision) {
-  SparseRows rows;
-  rows.append({{0, 0.5f}, {2, 0.25f}});
-  const std::vector<glm::vec4> values{glm::vec4(2e-3f, 0, -7e-4f, 0), glm::vec4(1e4f), glm::vec4(0)};
-  const glm::vec3 found = CompactRows(rows).dot(0, HalfColours(values));
-  EXPECT_NEAR(found.x, 1e-3f, 1e-6f);
-  EXPECT_EQ(found.y, 0);
-  EXPECT_NEAR(found.z, -3.5e-4f, 4e-7f);
 }
 
 }  // namespace

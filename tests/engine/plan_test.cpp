@@ -90,7 +90,7 @@ TEST(Plan, OutlinesLoseNoLight) {
   for (int k = 0; k < 12; ++k) {
     const float azimuth = 0.5f * static_cast<float>(k), height = 0.3f + 0.2f * static_cast<float>(k % 5);
     const Beam beam{glm::normalize(glm::vec3(std::cos(azimuth), std::sin(azimuth), height)), glm::vec3(1000)};
-    const std::vector<LitElement> few = light.deposit({beam}, outlined, 1), many = light.deposit({beam}, all, 1);
+    const std::vector<LitElement> few = light.deposit({beam}, outlined), many = light.deposit({beam}, all);
     ASSERT_EQ(few.size(), many.size()) << k;
     for (std::size_t i = 0; i < few.size(); ++i) {
       EXPECT_EQ(few[i].element, many[i].element);

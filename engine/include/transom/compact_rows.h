@@ -1,4 +1,4 @@
-/// @file Sparse rows in less memory, for sums over many of them: memory is what these wait for.
+/// @file Sparse rows for sums over many of them: in less memory, eight entries at once.
 #pragma once
 
 #include <cstdint>
@@ -8,22 +8,6 @@
 #include "transom/transfer.h"
 
 namespace transom {
-
-/// Values for the columns of compact rows: 11 bits of precision from the largest down to 2^-28 of it; smaller ones are
-/// 0. One channel for grey light, else three and a blank, which is 0.
-class HalfColours {
- public:
-  explicit HalfColours(const std::vector<glm::vec4>& colours);
-  explicit HalfColours(const std::vector<float>& greys);
-
- private:
-  friend class CompactRows;
-  void choose_unit(float most);
-
-  std::vector<std::uint16_t> half_;  // sign, 5 bits of exponent, 10 of mantissa
-  bool is_grey_ = false;
-  float unit_ = 1;  // a power of two: what 1 of a half stands for
-};
 
 /// Where the entries of sparse rows are: columns take two bytes each where these suffice.
 struct CompactColumns {
@@ -42,7 +26,10 @@ class ExactRows {
   ExactRows() = default;
   explicit ExactRows(const SparseRows& rows);
 
-  /// Sum over a row of weight x value; every fourth entry goes to the same of four sums.
+  std::size_t row_count() const { return columns_.begin.size() - 1; }
+  std::vector<Share> row(std::size_t i) const;
+
+  /// Sum over a row of weight x value; every eighth entry goes to the same of eight sums. Values are finite.
   glm::vec4 dot(std::size_t row, const std::vector<glm::vec4>& values) const;
   float dot(std::size_t row, const std::vector<float>& values) const;
 
@@ -52,7 +39,7 @@ class ExactRows {
 };
 
 /// Compressed sparse rows of weights that are not negative, each off by up to 1/131070 of the largest of its row; the
-/// sum of a row is kept. With values of halves a sum of some hundred is off by a few 1e-5 of itself.
+/// sum of a row is kept. A sum of some hundred is off by a few 1e-5 of itself.
 class CompactRows {
  public:
   CompactRows() = default;
@@ -60,8 +47,9 @@ class CompactRows {
 
   std::size_t row_count() const { return columns_.begin.size() - 1; }
 
-  /// Sum over a row of weight x value; every fourth entry goes to the same of four sums.
-  glm::vec3 dot(std::size_t row, const HalfColours& values) const;
+  /// Sum over a row of weight x value; every eighth entry goes to the same of eight sums. Values are finite.
+  glm::vec4 dot(std::size_t row, const std::vector<glm::vec4>& values) const;
+  float dot(std::size_t row, const std::vector<float>& values) const;
 
  private:
   CompactColumns columns_;

@@ -34,9 +34,10 @@ struct BeamPlan {
 /// its way to the sun, so that none is counted twice. Lobes come in shafts, whose part of an element is found exactly.
 class DirectLight {
  public:
-  /// small_opening_m2: area of an element; opening faces below it send their light themselves.
+  /// small_opening_m2: area of an element; opening faces below it send their light themselves. seed: of all samples.
   DirectLight(const LightMesh& mesh, const RayScene& rays, const std::vector<PointSource>& sources,
-              const std::vector<Material>& materials, float small_opening_m2);
+              const std::vector<Material>& materials, float small_opening_m2, std::uint32_t seed);
+  ~DirectLight();
 
   /// Patches that receive light, and what of them every beam needs.
   struct Receivers {
@@ -52,7 +53,7 @@ class DirectLight {
   /// Mean direct illuminance of the elements of the receivers that receive any, in their order. Stratified over each
   /// element, eight times as densely at edges of light. Patches behind openings cost rays only where the outline of an
   /// opening falls on them. plan: what it took is added to it; may be null.
-  std::vector<LitElement> deposit(const std::vector<Beam>& beams, const Receivers& receivers, std::uint32_t seed,
+  std::vector<LitElement> deposit(const std::vector<Beam>& beams, const Receivers& receivers,
                                   BeamPlan* plan = nullptr) const;
 
   /// Share of a beam that arrives at lifted points: 0 where something opaque intervenes, else the transmittance. Of a
@@ -72,38 +73,36 @@ class DirectLight {
   class Patterns;
   using Corners = std::array<glm::vec3, 4>;
   using Points = BeamOutlines::Points;
-  Points points_on(int slot, const Corners& corners, std::span<const int> elements, std::size_t samples,
-                   const Patterns& patterns) const;
+  Points points_on(int slot, const Corners& corners, std::span<const int> elements, std::size_t samples) const;
   struct SunlitSlot;
   class Sun;
   std::vector<SunlitSlot> reached(const Sun& sun, const Receivers& receivers) const;
   std::vector<SunlitSlot> reached(const Sun& sun, const Receivers& receivers, std::size_t begin, std::size_t end) const;
   void sun_transmission(const Sun& sun, const SunlitSlot& slot, const Points& points, std::span<float> share) const;
-  std::vector<float> sample_sun(const Sun& sun, const Receivers& receivers, const std::vector<SunlitSlot>& candidates,
-                                const Patterns& patterns) const;
+  std::vector<float> sample_sun(const Sun& sun, const Receivers& receivers,
+                                const std::vector<SunlitSlot>& candidates) const;
   bool is_lit_as_all_around(int slot, const std::vector<int>& place_of_slot,
                             const std::vector<float>& evenly_lit) const;
   std::vector<int> partly_lit(int slot, const std::vector<int>& place_of_slot, const std::vector<float>& share,
                               const std::vector<float>& evenly_lit) const;
-  void add_sun(const Beam& sun, const Receivers& receivers, const Patterns& patterns,
-               std::vector<std::vector<glm::vec3>>& sum, BeamPlan& plan) const;
+  void add_sun(const Beam& sun, const Receivers& receivers, std::vector<std::vector<glm::vec3>>& sum,
+               BeamPlan& plan) const;
   std::vector<std::size_t> reached_by_lobe(const Beam& lobe, const Receivers& receivers) const;
   std::vector<std::vector<glm::vec3>> element_outlines(int slot, const Corners& corners) const;
-  void lobe_on_slot(const Beam& lobe, int slot, const Corners& corners, std::uint32_t seed,
-                    std::vector<float>& mean) const;
-  void add_lobe(const Beam& lobe, const Receivers& receivers, std::uint32_t seed,
-                std::vector<std::vector<glm::vec3>>& sum, BeamPlan& plan) const;
+  void lobe_on_slot(const Beam& lobe, int slot, const Corners& corners, std::vector<float>& mean) const;
+  void add_lobe(const Beam& lobe, const Receivers& receivers, std::vector<std::vector<glm::vec3>>& sum,
+                BeamPlan& plan) const;
   void shaft_transmission(const Beam& lobe, std::span<const glm::vec3> points, std::span<float> share) const;
-  void sources_on_slot(int slot, const Corners& corners, glm::vec3 normal, const Patterns& patterns,
-                       std::vector<glm::vec3>& sum) const;
-  void sources_and_beams_on_cluster(const std::vector<Beam>& beams, int slot, std::uint32_t seed,
-                                    std::vector<glm::vec3>& sum) const;
+  void sources_on_slot(int slot, const Corners& corners, glm::vec3 normal, std::vector<glm::vec3>& sum) const;
+  void sources_and_beams_on_cluster(const std::vector<Beam>& beams, int slot, std::vector<glm::vec3>& sum) const;
 
   void ignore_small_openings(glm::vec3 direction, const Points& points, std::span<float> share) const;
-  std::map<int, glm::vec3> send_through_small_openings(const std::vector<Beam>& beams, std::uint32_t seed) const;
+  std::map<int, glm::vec3> send_through_small_openings(const std::vector<Beam>& beams) const;
 
   const LightMesh& mesh_;
   const RayScene& rays_;
+  std::uint32_t seed_;
+  std::unique_ptr<const Patterns> patterns_;
   bool is_convex_;  // nothing opaque stands between openings and what lies behind them
   std::vector<LocalSource> sources_;
   std::vector<int> openings_, small_openings_;  // faces

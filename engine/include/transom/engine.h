@@ -23,6 +23,7 @@
 #include "transom/ray_scene.h"
 #include "transom/scene_change.h"
 #include "transom/sky.h"
+#include "transom/sky_rows.h"
 #include "transom/trace.h"
 #include "transom/transfer.h"
 
@@ -189,7 +190,7 @@ class Engine {
   std::vector<int> first_slots() const;
   void mark_interior();
   void check_closed();
-  void assemble_transfer(const Known& known);
+  void assemble_transfer(const Known& known, SparseRows& patch_sky);
   void find_smooth_lights();
   struct TrialLight;
   struct NodeTrial;
@@ -206,8 +207,8 @@ class Engine {
   std::uint32_t node_seed(const Node& node) const;
   std::uint32_t patch_seed(int slot) const;
   void gather_panels();
-  void link_panels();
-  void balance_panels();
+  void link_panels(SparseRows& patch_sky);
+  void balance_panels(SparseRows& patch_sky) const;
   void solve_classic();
   std::shared_ptr<const Lighting> relight_classic(Condition condition, const Lighting* previous,
                                                   RelightFollower* follower) const;
@@ -217,12 +218,12 @@ class Engine {
   bool is_grey(const Condition& condition) const;
   std::shared_ptr<const Lighting> with_indirect_of(Lighting lighting, const Lighting* previous) const;
   void find_smooth_radiosity(Lighting& lighting) const;
-  HalfColours smooth_light_of_patches(const Lighting& lighting) const;
   std::vector<glm::vec4> sent_by_nodes_and_patches(const Lighting& lighting) const;
   std::vector<Share> resolved_by_nodes(const std::vector<Share>& elements) const;
   void gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& first_reflection) const;
   std::vector<Share> to_patches(const std::vector<Share>& slots) const;
-  glm::vec3 sky_light(const Lighting& lighting, const SparseRows& rows, std::size_t row) const;
+  SkyRadiance sky_radiance(const Lighting& lighting) const;
+  int ground_bin() const { return sky_index_->count() - 1; }
   void find_shafts(Condition& condition, std::vector<glm::vec3>& residual) const;
   double find_panel_radiance(const std::vector<glm::vec3>& radiosity, Lighting& lighting) const;
   void find_sky_light(Lighting& lighting) const;
@@ -260,7 +261,8 @@ class Engine {
   bool is_grey_scene_ = false;        // all reflectances and emitters
   bool connects_emitters_ = false;    // small emitters: found by connection, not by rays
   std::shared_ptr<const SparseRows> form_factors_;
-  SparseRows through_, patch_sky_;
+  SparseRows through_;
+  SkyRows patch_sky_;
   std::unique_ptr<Interreflection> interreflection_;
   std::vector<std::vector<float>> smooth_lights_;  // radiosity of patches: first what the sky makes, if it is seen
   bool has_sky_ = false;
@@ -268,15 +270,16 @@ class Engine {
   // Panels: products by opening; what arrives at each incident bin from the sky, and from elements or patches outdoors.
   std::vector<Product> products_;
   std::vector<GatherRow> panel_rows_;  // during solve
-  SparseRows panel_sky_, panel_patches_;
+  SkyRows panel_sky_;
+  SparseRows panel_patches_;
 
   // Where light is shown.
   std::unique_ptr<NodeField> nodes_;
   std::shared_ptr<const NodeRows> node_rows_;
-  SparseRows node_sky_;                       // all of the sky
+  SkyRows node_sky_;                          // all of the sky
   CompactRows node_patches_;                  // all that nodes see of patches
   std::vector<NodeShares> nodes_at_element_;  // what speaks for each element of patches, at its middle
-  SparseRows node_near_;  // what the nodes, then the patches, send close by: those with their weights, less these
+  ExactRows node_near_;  // what the nodes, then the patches, send close by: those with their weights, less these
   std::unique_ptr<PointLinks> links_;
 
   // Light that no condition changes: of point sources on elements, and its first reflection, with small emitters, at

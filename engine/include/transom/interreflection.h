@@ -94,7 +94,7 @@ class Interreflection {
   std::vector<int> cluster_of_;
   std::vector<float> cluster_area_;
   std::vector<glm::vec3> cluster_reflectance_;
-  std::vector<float> operator_;  // row by row: irradiance of clusters from what they have not yet reflected
+  ExactRows operator_;  // irradiance of clusters from what they have not yet reflected
 };
 
 }  // namespace transom

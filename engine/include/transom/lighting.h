@@ -11,6 +11,7 @@
 #include "transom/gather.h"
 #include "transom/light_mesh.h"
 #include "transom/sky.h"
+#include "transom/sky_rows.h"
 #include "transom/transfer.h"
 
 namespace transom {
@@ -68,7 +69,8 @@ struct Sensors {
   std::vector<glm::vec3> normals;
   GatherSamples samples;
   std::vector<Node> nodes;
-  SparseRows sky, patches;  ///< weights of sky bins and of patches
+  SkyRows sky;
+  SparseRows patches;
   SparseRows resolved;      ///< what nodes say of the patches, less the patches: of nodes, then of patches
 
   /// Whether these are the sensors that were asked for.

@@ -170,7 +170,8 @@ class PointLinks {
   std::vector<float> shares_of_groups(const Link& link, std::span<const BrightElement> bright, float sum) const;
   static std::vector<Hue> hues_of(const std::vector<LitPatch>& lit);
   void add_far(const Hue& hue, std::size_t first_block, std::size_t last_block, float* received) const;
-  void add_uneven_block(const LitPatch& patch, std::size_t place, std::size_t from, float* received) const;
+  void add_uneven_block(const LitPatch& patch, std::size_t place, std::size_t from,
+                        std::vector<Partial>::const_iterator& partial, float* received) const;
   void add_blocks(const std::vector<LitPatch>& lit, const std::vector<Hue>& hues, std::size_t chunk,
                   std::vector<glm::vec3>& irradiance) const;
   // As it is stored, and back.

@@ -54,6 +54,10 @@ class RayScene {
   void occluded(What what, std::span<const Ray> rays, std::span<std::uint8_t> blocked,
                 Order order = Order::kScattered) const;
 
+  /// The same of rays that all go one way, without end; x, y and z: where they start, as many as `blocked`.
+  void occluded_along(glm::vec3 direction, const float* x, const float* y, const float* z, What what,
+                      std::span<std::uint8_t> blocked) const;
+
   /// Product of the transmittances of all openings between t_near and t_far of each ray. Opaque surfaces are not looked
   /// at.
   void transmittance(std::span<const Ray> rays, std::span<float> shares, Order order = Order::kScattered) const;

@@ -1,8 +1,6 @@
 /// @file Sparse rows of weights, and form factors made reciprocal and closed.
 #pragma once
 
-#include <xmmintrin.h>
-
 #include <functional>
 #include <glm/glm.hpp>
 #include <vector>
@@ -41,37 +39,6 @@ struct SparseRows {
   Value dot(std::size_t row, const std::vector<Value>& values) const {
     Value sum(0);
     for (std::size_t k = begin[row]; k < begin[row + 1]; ++k) sum += entries[k].weight * values[entries[k].index];
-    return sum;
-  }
-  /// The same for single floats and for values of four: every fourth entry goes to the same of four sums, so that none
-  /// waits for the last, and these are added at the end.
-  float dot(std::size_t row, const std::vector<float>& values) const {
-    return dot_of(begin[row], begin[row + 1], values);
-  }
-  /// Sum over entries from one to before another.
-  float dot_of(std::size_t first, std::size_t end, const std::vector<float>& values) const {
-    float sums[4] = {0, 0, 0, 0};
-    const auto term = [&](std::size_t i) { return entries[i].weight * values[entries[i].index]; };
-    std::size_t k = first;
-    for (; k + 4 <= end; k += 4)
-      for (std::size_t lane = 0; lane < 4; ++lane) sums[lane] += term(k + lane);
-    for (std::size_t lane = 0; k < end; ++k, ++lane) sums[lane] += term(k);
-    return (sums[0] + sums[1]) + (sums[2] + sums[3]);
-  }
-  glm::vec4 dot(std::size_t row, const std::vector<glm::vec4>& values) const {
-    const float* value = values.empty() ? nullptr : &values[0].x;
-    __m128 sums[4] = {_mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps()};
-    const std::size_t end = begin[row + 1];
-    const auto term = [&](std::size_t i) {
-      return _mm_mul_ps(_mm_set1_ps(entries[i].weight),
-                        _mm_loadu_ps(value + 4 * static_cast<std::size_t>(entries[i].index)));
-    };
-    std::size_t k = begin[row];
-    for (; k + 4 <= end; k += 4)
-      for (std::size_t lane = 0; lane < 4; ++lane) sums[lane] = _mm_add_ps(sums[lane], term(k + lane));
-    for (std::size_t lane = 0; k < end; ++k, ++lane) sums[lane] = _mm_add_ps(sums[lane], term(k));
-    glm::vec4 sum;
-    _mm_storeu_ps(&sum.x, _mm_add_ps(_mm_add_ps(sums[0], sums[1]), _mm_add_ps(sums[2], sums[3])));
     return sum;
   }
 };
