@@ -41,14 +41,12 @@ Lighting Engine::direct_classic(Condition condition, const Lighting* previous) c
         lighting.patch_sky[p] = patch_sky_.irradiance(p, radiance);
       }
     const std::vector<Beam>& beams = lighting.condition.beams;
-    std::vector<LitElement> lit =
-        direct_light_->deposit(beams, direct_light_->receivers(outdoors, {}));
+    std::vector<LitElement> lit = direct_light_->deposit(beams, direct_light_->receivers(outdoors, {}));
     if (!scene_.point_sources.empty()) {
       std::vector<int> indoors;
       for (std::size_t p = 0; p < n; ++p)
         if (is_interior_[p]) indoors.push_back(slot_of_patch_[p]);
-      const std::vector<LitElement> more =
-          direct_light_->deposit({}, direct_light_->receivers(indoors, {}));
+      const std::vector<LitElement> more = direct_light_->deposit({}, direct_light_->receivers(indoors, {}));
       lit.insert(lit.end(), more.begin(), more.end());
     }
     for (const LitElement& e : lit) {

@@ -113,9 +113,7 @@ class GreySums {
   void add(const Eight& weights, const Column* column) {
     for (std::size_t k = 0; k < kLanes; ++k) sums_[k] += weights.lane[k] * value_[column[k]];
   }
-  float total() const {
-    return sum_of(sums_);
-  }
+  float total() const { return sum_of(sums_); }
 
  private:
   const float* value_;
@@ -192,7 +190,8 @@ ExactRows::ExactRows(const SparseRows& rows) : columns_(rows) {
 std::vector<Share> ExactRows::row(std::size_t i) const {
   std::vector<Share> shares;
   for (std::size_t k = columns_.begin[i]; k < columns_.begin[i + 1]; ++k)
-    shares.push_back({static_cast<int>(columns_.are_short ? columns_.short_column[k] : columns_.column[k]), weight_[k]});
+    shares.push_back(
+        {static_cast<int>(columns_.are_short ? columns_.short_column[k] : columns_.column[k]), weight_[k]});
   return shares;
 }
 

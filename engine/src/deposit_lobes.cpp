@@ -119,8 +119,8 @@ std::vector<std::size_t> DirectLight::reached_by_lobe(const Beam& lobe, const Re
 }
 
 // Adds a lobe to the light of elements, by receiver.
-void DirectLight::add_lobe(const Beam& lobe, const Receivers& receivers,
-                           std::vector<std::vector<glm::vec3>>& sum, BeamPlan& plan) const {
+void DirectLight::add_lobe(const Beam& lobe, const Receivers& receivers, std::vector<std::vector<glm::vec3>>& sum,
+                           BeamPlan& plan) const {
   const std::vector<std::size_t> candidates = reached_by_lobe(lobe, receivers);
   plan.patches += static_cast<int>(candidates.size());
   plan.beams += !candidates.empty();

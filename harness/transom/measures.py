@@ -46,7 +46,8 @@ UP_CLOSE = "faces up close"
 UP_CLOSE_M = 1e-3
 UP_CLOSE_RAYS = 64
 LEAST_TRIANGLE_M2 = 1e-5
-"""Distance from the triangle, rays of each measurement, and the smallest triangle that has one."""
+PLACE_DECIMALS = 12
+"""Distance from the triangle, rays of each measurement, the smallest triangle that has one, and digits of its place."""
 
 LEAST_LIGHT_SHARE = 0.01
 """Changes of a triangle's light are stated in percent of it, or of this share of the mean if it is darker."""
@@ -154,7 +155,8 @@ def triangle_points(scene: Scene) -> SensorTable:
             names.append(f"{face_words(scene, face)}, triangle {index + 1}")
             points.append((a + b + c) / 3 + UP_CLOSE_M * normal / length)
             normals.append(-normal / length)
-    return SensorTable(tuple(names), np.array(points), np.array(normals))
+    # The last bits of linear algebra hang on the processor: without them, the question is the same on every machine.
+    return SensorTable(tuple(names), np.round(points, PLACE_DECIMALS), np.round(normals, PLACE_DECIMALS))
 
 
 def triangle_measures(table: SensorTable) -> Iterator[Measure]:

@@ -140,7 +140,8 @@ TEST(SkyRows, AddBinsGroundAndPanelsInTheirColours) {
   rows.append({});
   const SkyRows sky(rows, 3);
   const std::vector<float> luminance{8, 100, 4};
-  const SkyRadiance radiance{luminance, {1, 2, 4}, {glm::vec4(16, 8, 0, 0), glm::vec4(1, 2, 3, 0), glm::vec4(0, 0, 1, 0)}};
+  const SkyRadiance radiance{
+      luminance, {1, 2, 4}, {glm::vec4(16, 8, 0, 0), glm::vec4(1, 2, 3, 0), glm::vec4(0, 0, 1, 0)}};
   EXPECT_EQ(sky.irradiance(0, radiance), glm::vec3(5 + 2, 10 + 1, 20 + 0 + 2));
   EXPECT_EQ(sky.irradiance(1, radiance), glm::vec3(1, 2, 3));
   EXPECT_EQ(sky.irradiance(2, radiance), glm::vec3(0));

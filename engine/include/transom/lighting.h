@@ -71,7 +71,7 @@ struct Sensors {
   std::vector<Node> nodes;
   SkyRows sky;
   SparseRows patches;
-  SparseRows resolved;      ///< what nodes say of the patches, less the patches: of nodes, then of patches
+  SparseRows resolved;  ///< what nodes say of the patches, less the patches: of nodes, then of patches
 
   /// Whether these are the sensors that were asked for.
   bool are(const std::vector<glm::dvec3>& p, const std::vector<glm::vec3>& n, GatherSamples s) const {
