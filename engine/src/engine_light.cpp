@@ -111,18 +111,22 @@ void Engine::find_smooth_radiosity(Lighting& lighting) const {
                                          patch_reflectance_[p] * (lighting.patch_irradiance[p] - lighting.patch_sun[p]);
 }
 
+glm::vec3 Engine::emitted_at_node(std::size_t node) const {
+  return kPi * scene_.materials[faces_.faces[nodes_->surface(node) / 2].material].luminance;
+}
+
+// Radiosity of a node, but for what beams light.
+glm::vec3 Engine::sent_by_node(const Lighting& lighting, std::size_t node) const {
+  return (connects_emitters_ ? glm::vec3(0) : emitted_at_node(node)) +
+         reflectance(nodes_->surface(node) / 2, nodes_->surface(node) % 2) *
+             (lighting.node_sky[node] + lighting.node_indirect[node]);
+}
+
 // Radiosity of every node, then of every patch, but for what beams light.
 std::vector<glm::vec4> Engine::sent_by_nodes_and_patches(const Lighting& lighting) const {
   const std::size_t node_count = lighting.node_indirect.size(), patch_count = lighting.patch_smooth_radiosity.size();
   std::vector<glm::vec4> sent(node_count + patch_count);
-  parallel_indices(node_count, 64, [&](std::size_t i) {
-    const int face = nodes_->surface(i) / 2;
-    const glm::vec3 emitted = kPi * scene_.materials[faces_.faces[face].material].luminance;
-    sent[i] =
-        glm::vec4((connects_emitters_ ? glm::vec3(0) : emitted) +
-                      reflectance(face, nodes_->surface(i) % 2) * (lighting.node_sky[i] + lighting.node_indirect[i]),
-                  0);
-  });
+  parallel_indices(node_count, 64, [&](std::size_t i) { sent[i] = glm::vec4(sent_by_node(lighting, i), 0); });
   for (std::size_t p = 0; p < patch_count; ++p) sent[node_count + p] = glm::vec4(lighting.patch_smooth_radiosity[p], 0);
   return sent;
 }
@@ -147,10 +151,19 @@ void Engine::gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& f
     for (std::size_t p = 0; p < radiosity.size(); ++p) colours[p] = glm::vec4(radiosity[p], 0);
     gather(colours);
   }
-  // What is seen close by is not as even as its patch: the nodes on it, as they are now, speak for it.
-  const std::vector<glm::vec4> sent = sent_by_nodes_and_patches(lighting);
-  parallel_indices(first_reflection.size(), 64,
-                   [&](std::size_t i) { lighting.node_indirect[i] += glm::vec3(node_near_.dot(i, sent)); });
+  // What is seen close by is not as even as its patch: the nodes on it, as they are now, speak for it. Those that see
+  // little else come to agree first.
+  const std::vector<glm::vec3> from_patches = lighting.node_indirect;
+  std::vector<glm::vec4> sent = sent_by_nodes_and_patches(lighting);
+  const auto add_near = [&](std::size_t i) {
+    lighting.node_indirect[i] = from_patches[i] + glm::vec3(node_near_.dot(i, sent));
+  };
+  for (const std::vector<std::size_t>& nodes : nodes_of_round_) {
+    parallel_indices(nodes.size(), 64, [&](std::size_t k) { add_near(nodes[k]); });
+    parallel_indices(nodes.size(), 64,
+                     [&](std::size_t k) { sent[nodes[k]] = glm::vec4(sent_by_node(lighting, nodes[k]), 0); });
+  }
+  parallel_indices(first_reflection.size(), 64, add_near);
 }
 
 std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Lighting* previous,

@@ -32,6 +32,9 @@ constexpr float kSloping = 2;  // from which on the middle is to be right to thi
 constexpr float kSlopingShare = 0.35f;
 constexpr float kNear = 0.25f;  // length of a part against the distance of what it sees
 
+constexpr int kMostRounds = 10;      // of gathering what is close by, before the one that all nodes take part in
+constexpr float kAgreement = 0.03f;  // of the light of a node, with which it leaves them
+
 }  // namespace
 
 /// Some light whose shape at the nodes is that of the light of many conditions.
@@ -196,6 +199,48 @@ void Engine::resolve_near_light(const NodeTrial& trial) {
   std::vector<std::vector<Share>> rows(nodes_->nodes().size());
   parallel_indices(rows.size(), kGrain, [&](std::size_t i) { rows[i] = resolved_by_nodes(trial.rows[i].near); });
   node_near_ = ExactRows(SparseRows::of(rows));
+  find_rounds(trial);
+}
+
+// Which nodes have to gather what is close by more than once: those that see little else, as under a slab. There light
+// decays over many reflections between places that a patch does not tell apart, and what nodes send comes to agree only
+// round by round.
+void Engine::find_rounds(const NodeTrial& trial) {
+  const std::size_t node_count = nodes_->nodes().size();
+  std::vector<int> rounds(node_count, 0);
+  for (const TrialLight& light : trial.lights) {
+    if (light.sky == kSunnySky) continue;  // its patches are lit by more sky than its nodes
+    std::vector<float> sent(node_count);
+    sent.insert(sent.end(), light.radiosity.begin(), light.radiosity.end());
+    std::vector<std::vector<float>> after{light.at_nodes};  // each round, the last of all included
+    for (int round = 0; round <= kMostRounds; ++round) {
+      const std::vector<float>& before = after.back();
+      parallel_indices(node_count, 64, [&](std::size_t i) {
+        const glm::vec3 rho = reflectance(nodes_->surface(i) / 2, nodes_->surface(i) % 2),
+                        all = rho * before[i] + (light.sky > 0 ? glm::vec3(0) : emitted_at_node(i));
+        sent[i] = (all.x + all.y + all.z) / 3;
+      });
+      std::vector<float> next(node_count);
+      parallel_indices(node_count, 64, [&](std::size_t i) { next[i] = light.at_nodes[i] + node_near_.dot(i, sent); });
+      after.push_back(std::move(next));
+    }
+    for (std::size_t i = 0; i < node_count; ++i) {
+      if (!nodes_->is_exposed(i)) continue;
+      const float bound = kAgreement * std::max(after.back()[i], light.dark);
+      int round = kMostRounds;
+      while (round > rounds[i] && std::abs(after[static_cast<std::size_t>(round)][i] - after.back()[i]) <= bound)
+        --round;
+      rounds[i] = round;
+    }
+  }
+  nodes_of_round_.clear();
+  for (int round = 1; round <= kMostRounds; ++round) {
+    std::vector<std::size_t> nodes;
+    for (std::size_t i = 0; i < node_count; ++i)
+      if (rounds[i] >= round) nodes.push_back(i);
+    if (nodes.empty()) break;
+    nodes_of_round_.push_back(std::move(nodes));
+  }
 }
 
 // Whether light may change within a part otherwise than linearly, so that it is worth a node in its middle.

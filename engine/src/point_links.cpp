@@ -9,7 +9,7 @@
 namespace transom {
 namespace {
 
-constexpr std::size_t kMemory = 512u << 20;  // for links [bytes]
+constexpr std::size_t kBatch = 512;  // of patches that are linked together
 
 // What people build is aligned, and so are the places on it: many segments run along a face, or through its very edge,
 // and whether they meet it would hang on what else is traced. Moved aside by this much of the lift, they pass or do
@@ -19,11 +19,12 @@ constexpr glm::vec3 kAside{0.11f, 0.15f, 0.23f};
 }  // namespace
 
 PointLinks::PointLinks(const LightMesh& mesh, const RayScene& rays, const std::vector<Node>& points,
-                       NodeNeighbours neighbours)
+                       NodeNeighbours neighbours, std::size_t memory)
     : mesh_(mesh),
       rays_(rays),
       point_count_(points.size()),
       neighbours_(std::move(neighbours)),
+      memory_(memory),
       openings_(mesh.faces(), rays.faces_of(RayScene::What::kOpenings), points, kBlock),
       links_(static_cast<std::size_t>(mesh.slot_count())) {
   const std::size_t padded = (points.size() + kBlock - 1) / kBlock * kBlock;
@@ -299,13 +300,32 @@ std::size_t PointLinks::bytes_of(const Link& link) const {
 
 // In the order of slots, so that patches that are beside each other come together.
 void PointLinks::prepare(const std::vector<int>& slots, const Known& known) const {
-  constexpr std::size_t kBatch = 512;  // of patches, after which the memory is looked at
   std::vector<int> in_order = slots;
   std::sort(in_order.begin(), in_order.end());
-  for (std::size_t begin = 0; begin < in_order.size() && byte_count() < kMemory; begin += kBatch)
-    links_of({in_order.begin() + static_cast<std::ptrdiff_t>(begin),
-              in_order.begin() + static_cast<std::ptrdiff_t>(std::min(in_order.size(), begin + kBatch))},
-             known);
+  for (std::size_t begin = 0; begin < in_order.size() && byte_count() < memory_; begin += kBatch) {
+    const std::size_t end = std::min(in_order.size(), begin + kBatch);
+    links_of(
+        {in_order.begin() + static_cast<std::ptrdiff_t>(begin), in_order.begin() + static_cast<std::ptrdiff_t>(end)},
+        known);
+    if (static_cast<double>(byte_count()) * static_cast<double>(in_order.size()) >
+        static_cast<double>(memory_) * static_cast<double>(end))
+      forget_weights();
+  }
+}
+
+// Two thirds of what far points take. What they hold can be found again without rays.
+void PointLinks::forget_weights() const {
+  const std::lock_guard lock(mutex_);
+  if (!keeps_weights_) return;
+  keeps_weights_ = false;
+  byte_count_ = 0;
+  for (std::shared_ptr<const Link>& kept : links_) {
+    if (!kept) continue;
+    auto link = std::make_shared<Link>(*kept);
+    link->weight = {};
+    byte_count_ += bytes_of(*link);
+    kept = std::move(link);
+  }
 }
 
 std::size_t PointLinks::byte_count() const {
@@ -313,7 +333,7 @@ std::size_t PointLinks::byte_count() const {
   return byte_count_;
 }
 
-// The links of some patches, found now if need be. Without room for more, what other conditions needed is given up.
+// The links of some patches, found now if need be, and kept while there is room.
 std::vector<std::shared_ptr<const PointLinks::Link>> PointLinks::links_of(const std::vector<int>& slots,
                                                                           const Known& known) const {
   std::vector<std::shared_ptr<const Link>> found(slots.size());
@@ -328,18 +348,20 @@ std::vector<std::shared_ptr<const PointLinks::Link>> PointLinks::links_of(const 
       missing_slots.push_back(slots[k]);
     }
   }
-  if (missing.empty()) return found;
-  const std::vector<std::shared_ptr<const Link>> made = found_links(missing_slots, known);
-  const std::lock_guard lock(mutex_);
-  for (std::size_t k = 0; k < missing.size(); ++k) {
-    found[missing[k]] = made[k];
-    if (links_[missing_slots[k]]) continue;
-    if (byte_count_ >= kMemory) {
-      std::fill(links_.begin(), links_.end(), nullptr);
-      byte_count_ = 0;
+  for (std::size_t begin = 0; begin < missing.size(); begin += kBatch) {
+    const std::size_t end = std::min(missing.size(), begin + kBatch);
+    const std::vector<std::shared_ptr<const Link>> made =
+        found_links({missing_slots.begin() + static_cast<std::ptrdiff_t>(begin),
+                     missing_slots.begin() + static_cast<std::ptrdiff_t>(end)},
+                    known);
+    const std::lock_guard lock(mutex_);
+    for (std::size_t k = begin; k < end; ++k) {
+      found[missing[k]] = made[k - begin];
+      const std::size_t bytes = bytes_of(*made[k - begin]);
+      if (links_[missing_slots[k]] || byte_count_ + bytes > memory_) continue;
+      byte_count_ += bytes;
+      links_[missing_slots[k]] = made[k - begin];
     }
-    byte_count_ += bytes_of(*made[k]);
-    links_[missing_slots[k]] = made[k];
   }
   return found;
 }

@@ -219,7 +219,7 @@ void PointLinks::link_far(Link& link, const MiddleView& view, const std::vector<
     link.seen[link.seen.size() - kBlock + i % kBlock] = seen;
     if (is_asked[i]) link.asked.back() |= std::uint64_t{1} << i % kBlock;
   }
-  weigh_far(link, view.slot);
+  if (keeps_weights_) weigh_far(link, view.slot);
 }
 
 // Far points take all that they see of an evenly lit patch to be at its centroid.

@@ -113,30 +113,30 @@ void PointLinks::add_far(const Hue& hue, std::size_t first_block, std::size_t la
   const std::size_t base = first_block * kBlock;
   for (const LitPatch* patch : hue.patches) {
     const Link& link = *patch->link;
-    if (patch->is_even && link.weight.empty()) continue;
+    const bool is_weighed = patch->is_even && !link.weight.empty();
     const float scale = link.weight_unit * patch->radiosity;
     auto block = std::lower_bound(link.block.begin(), link.block.end(), static_cast<int>(first_block));
     auto partial = std::lower_bound(
-        link.partial.begin(), patch->is_even ? link.partial.begin() : link.partial.end(), base,
+        link.partial.begin(), is_weighed ? link.partial.begin() : link.partial.end(), base,
         [](const Partial& before, std::size_t point) { return static_cast<std::size_t>(before.point) < point; });
     for (; block != link.block.end() && *block < static_cast<int>(last_block); ++block) {
       const std::size_t from = static_cast<std::size_t>(*block) * kBlock,
                         place = static_cast<std::size_t>(block - link.block.begin()) * kBlock;
       float* to = received + (from - base);
-      if (patch->is_even) {
+      if (is_weighed) {
         const std::uint16_t* known = &link.weight[place];
         for (std::size_t k = 0; k < kBlock; ++k) to[k] += scale * static_cast<float>(static_cast<int>(known[k]));
       } else {
-        add_uneven_block(*patch, place, from, partial, to);
+        add_block(*patch, place, from, partial, to);
       }
     }
   }
 }
 
-// What an unevenly lit patch sends to the far points of a block; place: of the block in the link. partial: the first of
-// the link that may be of the block; the first after it when this returns.
-void PointLinks::add_uneven_block(const LitPatch& patch, std::size_t place, std::size_t from,
-                                  std::vector<Partial>::const_iterator& partial, float* received) const {
+// What a patch, unevenly lit or not weighed beforehand, sends to the far points of a block; place: of the block in the
+// link. partial: the first of the link that may be of the block; the first after it when this returns.
+void PointLinks::add_block(const LitPatch& patch, std::size_t place, std::size_t from,
+                           std::vector<Partial>::const_iterator& partial, float* received) const {
   const Link& link = *patch.link;
   const glm::vec3 c = patch.centroid, m = patch.normal;
   const float flux = patch.flux;

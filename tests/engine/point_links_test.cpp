@@ -98,6 +98,25 @@ TEST(PointLinks, PreparedBeforehandOrWhenNeededIsTheSame) {
   EXPECT_EQ(floor.by_links(early), floor.by_links(late));
 }
 
+TEST(PointLinks, LessMemoryCostsTimeAlone) {
+  LitFloor floor(true);
+  std::vector<int> slots;
+  for (int cell = 0; cell < floor.mesh->grid(0).cell_count(); ++cell)
+    slots.push_back(floor.mesh->slot_index(0, 0, cell));
+  PointLinks all(*floor.mesh, *floor.rays, floor.points);
+  all.prepare(slots, {});
+  const std::vector<glm::vec3> expected = floor.by_links(all);
+  for (const double share : {0.9, 0.3, 0.01}) {  // of what all links take: without weights, some of them, none
+    const auto memory = static_cast<std::size_t>(share * static_cast<double>(all.byte_count()));
+    PointLinks links(*floor.mesh, *floor.rays, floor.points, {}, memory);
+    links.prepare(slots, {});
+    const std::vector<glm::vec3> found = floor.by_links(links);
+    EXPECT_LE(links.byte_count(), memory) << share;
+    for (std::size_t i = 0; i < found.size(); ++i)
+      EXPECT_NEAR(found[i].x, expected[i].x, 1e-4f * expected[i].x + 1e-3f) << share << " " << i;
+  }
+}
+
 TEST(PointLinks, AnEvenlyLitPatchIsTheLimitOfAnAlmostEvenOne) {
   // The one is known beforehand, the other is found element by element and at the centroid of its light.
   LitFloor even(true), uneven(true);

@@ -200,6 +200,7 @@ class Engine {
   void gather_new_nodes(NodeTrial& trial, int first_part, Known& known);
   void keep_node_rows(NodeTrial& trial, Known& known);
   void resolve_near_light(const NodeTrial& trial);
+  void find_rounds(const NodeTrial& trial);
   bool is_worth_a_look(const NodeTrial& trial, int part, int level, float tolerance) const;
   bool is_to_be_divided(const NodeTrial& trial, int part, int level, float tolerance) const;
   void gather_nodes(Known& known);
@@ -218,6 +219,8 @@ class Engine {
   bool is_grey(const Condition& condition) const;
   std::shared_ptr<const Lighting> with_indirect_of(Lighting lighting, const Lighting* previous) const;
   void find_smooth_radiosity(Lighting& lighting) const;
+  glm::vec3 emitted_at_node(std::size_t node) const;
+  glm::vec3 sent_by_node(const Lighting& lighting, std::size_t node) const;
   std::vector<glm::vec4> sent_by_nodes_and_patches(const Lighting& lighting) const;
   std::vector<Share> resolved_by_nodes(const std::vector<Share>& elements) const;
   void gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& first_reflection) const;
@@ -280,6 +283,7 @@ class Engine {
   CompactRows node_patches_;                  // all that nodes see of patches
   std::vector<NodeShares> nodes_at_element_;  // what speaks for each element of patches, at its middle
   ExactRows node_near_;  // what the nodes, then the patches, send close by: those with their weights, less these
+  std::vector<std::vector<std::size_t>> nodes_of_round_;  // that gather what is close by before all do, and again
   std::unique_ptr<PointLinks> links_;
 
   // Light that no condition changes: of point sources on elements, and its first reflection, with small emitters, at

@@ -30,9 +30,9 @@ namespace transom {
 class PointLinks {
  public:
   /// neighbours: of the points; one that has none, not even itself, gets no light. Left out: all get some, and a far
-  /// patch is seen as its middle is.
+  /// patch is seen as its middle is. memory: for what is kept [bytes].
   PointLinks(const LightMesh& mesh, const RayScene& rays, const std::vector<Node>& points,
-             NodeNeighbours neighbours = {});
+             NodeNeighbours neighbours = {}, std::size_t memory = kMemory);
 
   /// What has been linked in another state of the scene.
   struct Known {
@@ -43,7 +43,10 @@ class PointLinks {
     bool has_same_glazing = false;        ///< else only what is seen without looking through an opening is of use
   };
 
-  /// Links the patches of these slots to all points, as far as memory allows. known: what need not be found again.
+  static constexpr std::size_t kMemory = 512u << 20;
+
+  /// Links the patches of these slots to all points. Where memory would not do for all, the weights of evenly lit ones
+  /// are not kept, and then not all links: relighting finds again what it needs. known: what need not be found.
   void prepare(const std::vector<int>& slots, const Known& known) const;
 
   /// Adds to the irradiance of every point [lx] what the bright elements send to it; elements of one slot stand
@@ -116,6 +119,7 @@ class PointLinks {
     std::vector<const LitPatch*> patches;
   };
   std::size_t bytes_of(const Link& link) const;
+  void forget_weights() const;
   /// The part of a patch that does not lie inside a solid.
   struct Exposed {
     glm::vec3 middle{0};
@@ -170,8 +174,8 @@ class PointLinks {
   std::vector<float> shares_of_groups(const Link& link, std::span<const BrightElement> bright, float sum) const;
   static std::vector<Hue> hues_of(const std::vector<LitPatch>& lit);
   void add_far(const Hue& hue, std::size_t first_block, std::size_t last_block, float* received) const;
-  void add_uneven_block(const LitPatch& patch, std::size_t place, std::size_t from,
-                        std::vector<Partial>::const_iterator& partial, float* received) const;
+  void add_block(const LitPatch& patch, std::size_t place, std::size_t from,
+                 std::vector<Partial>::const_iterator& partial, float* received) const;
   void add_blocks(const std::vector<LitPatch>& lit, const std::vector<Hue>& hues, std::size_t chunk,
                   std::vector<glm::vec3>& irradiance) const;
   // As it is stored, and back.
@@ -200,15 +204,17 @@ class PointLinks {
   const RayScene& rays_;
   std::size_t point_count_;
   NodeNeighbours neighbours_;
+  std::size_t memory_;                           // for links [bytes]
   std::vector<float> x_, y_, z_, nx_, ny_, nz_;  // of the points, padded to whole blocks
   std::vector<glm::vec3> block_middle_;
   std::vector<float> block_radius_;
   Screens openings_;  // that may stand between places and the blocks
 
-  // What has been found is kept. It changes no answer, only what the next one costs.
+  // What has been found is kept. It changes no answer but for the rounding of weights, only what the next one costs.
   mutable std::mutex mutex_;
   mutable std::vector<std::shared_ptr<const Link>> links_;  // by slot
   mutable std::size_t byte_count_ = 0;
+  mutable bool keeps_weights_ = true;
 };
 
 }  // namespace transom
