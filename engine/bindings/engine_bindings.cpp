@@ -7,6 +7,8 @@
 #include <nanobind/stl/vector.h>
 
 #include <oneapi/tbb/global_control.h>
+#include "arrays.h"
+#include "condition_bindings.h"
 #include "section_bindings.h"
 
 #include <memory>
@@ -25,30 +27,8 @@ using namespace transom;
 
 namespace {
 
-template <typename T, typename... Shape>
-using In = nb::ndarray<const T, Shape..., nb::c_contig, nb::device::cpu>;
-
-// An array that owns `values` (moved, not copied) and shows them with the given shape.
-template <typename Scalar, typename Value, typename Memory>
-nb::ndarray<nb::numpy, Scalar> to_array(std::vector<Value, Memory>&& values, std::vector<std::size_t> shape) {
-  using Values = std::vector<Value, Memory>;
-  auto* kept = new Values(std::move(values));
-  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<Values*>(p); });
-  return nb::ndarray<nb::numpy, Scalar>(kept->data(), shape.size(), shape.data(), owner);
-}
-
-template <typename Value, typename Array>
-std::vector<Value> to_vector(const Array& array) {
-  const auto* begin = reinterpret_cast<const Value*>(array.data());
-  return std::vector<Value>(begin, begin + array.size() * sizeof(*array.data()) / sizeof(Value));
-}
-
 nb::ndarray<nb::numpy, float> picture(Picture&& pixels, int width, int height) {
   return to_array<float>(std::move(pixels), {static_cast<std::size_t>(height), static_cast<std::size_t>(width), 3});
-}
-
-glm::vec3 vector_of(std::tuple<float, float, float> v) {
-  return {std::get<0>(v), std::get<1>(v), std::get<2>(v)};
 }
 
 // The engine with its present light, the renderer that looks at it, and the sensors that were asked last.
@@ -56,11 +36,24 @@ struct Session {
   Engine engine;
   FrameRenderer renderer;
   std::shared_ptr<const Lighting> present = std::make_shared<const Lighting>();
-  Sensors sensors;
+  std::shared_ptr<const Sensors> sensors;
   std::unique_ptr<RelightWorker> worker;  // while light is found beside other work; after the engine that it uses
-  std::pair<std::uint64_t, bool> take(RelightWorker::State state) {
+  RelightWorker& running() {
+    if (!worker) throw std::runtime_error("no light is being found: the `with` block of relighting() has ended");
+    return *worker;
+  }
+  // What asks the worker for a state, without Python's lock; the state is made the present one with it.
+  template <typename Ask>
+  std::pair<std::uint64_t, bool> take(const Ask& ask) {
+    RelightWorker& from = running();
+    RelightWorker::State state = without_lock([&] { return ask(from); });
     if (state.number > 0) present = std::move(state.lighting);
     return {state.number, state.number > 0 && present->is_final};
+  }
+  template <typename Body>
+  static auto without_lock(const Body& body) {
+    const nb::gil_scoped_release release;
+    return body();
   }
   Session(SceneGeometry scene, const SkyBins& bins, SolveOptions options)
       : engine(std::move(scene), bins, options), renderer(engine) {}
@@ -204,58 +197,7 @@ NB_MODULE(_engine, m) {
       .def_ro("panel_count", &SolveFacts::panel_count)
       .def_ro("panel_bin_count", &SolveFacts::panel_bin_count);
 
-  nb::class_<SkyPicture>(m, "SkyPicture", "What is seen of a sky; rows from the zenith to the horizon.")
-      .def(
-          "__init__",
-          [](SkyPicture* self, In<float, nb::ndim<2>> luminance) {
-            new (self) SkyPicture{to_vector<float>(luminance), static_cast<int>(luminance.shape(1)),
-                                  static_cast<int>(luminance.shape(0))};
-          },
-          "luminance"_a);
-
-  nb::class_<Condition>(m, "Condition")
-      .def(
-          "__init__",
-          [](Condition* self, In<float, nb::ndim<1>> sky_luminance, std::tuple<float, float, float> sky_colour,
-             std::tuple<float, float, float> ground_luminance) {
-            new (self) Condition{};
-            self->sky_luminance = to_vector<float>(sky_luminance);
-            const auto [sr, sg, sb] = sky_colour;
-            self->sky_colour = {sr, sg, sb};
-            const auto [gr, gg, gb] = ground_luminance;
-            self->ground_luminance = {gr, gg, gb};
-          },
-          "sky_luminance"_a, "sky_colour"_a, "ground_luminance"_a)
-      .def(
-          "add_beam",
-          [](Condition& c, std::tuple<float, float, float> direction, std::tuple<float, float, float> illuminance) {
-            const auto [x, y, z] = direction;
-            const auto [r, g, b] = illuminance;
-            c.beams.push_back({{x, y, z}, {r, g, b}});
-          },
-          "direction_to_source"_a, "normal_illuminance"_a)
-      .def(
-          "add_sub_sun",
-          [](Condition& c, std::tuple<float, float, float> direction, std::tuple<float, float, float> illuminance) {
-            c.sub_suns.push_back({vector_of(direction), vector_of(illuminance)});
-          },
-          "direction_to_source"_a, "normal_illuminance"_a,
-          "Part of the sun's disc, which stands for the sun where its light is shown or measured at points.")
-      .def(
-          "add_lobe",
-          [](Condition& c, int opening, std::tuple<float, float, float> direction,
-             std::tuple<float, float, float> illuminance, std::tuple<float, float, float> sun) {
-            c.beams.push_back({vector_of(direction), vector_of(illuminance), opening, vector_of(sun)});
-          },
-          "opening"_a, "direction_to_source"_a, "normal_illuminance"_a, "direction_to_sun"_a,
-          "Parallel light behind the panels of an opening group that the sun reaches.")
-      .def(
-          "add_residual",
-          [](Condition& c, int opening, In<float, nb::shape<-1, 3>> radiance, std::tuple<float, float, float> sun) {
-            c.residuals.push_back({opening, vector_of(sun), to_vector<glm::vec3>(radiance)});
-          },
-          "opening"_a, "radiance"_a, "direction_to_sun"_a,
-          "Radiance of panels in full sun by exit bin [cd/m²]: the sun's light that lobes leave.");
+  bind_condition(m);
 
   nb::class_<View>(m, "View").def(
       "__init__",
@@ -295,32 +237,34 @@ NB_MODULE(_engine, m) {
           "opening"_a, "transmission"_a, "room_reflectance"_a,
           "BTDF by bins [1/sr], row = exit bin, and room reflectance of an opening group's panels.")
       .def(
-          "relight", [](Session& s, const Condition& c) { s.present = s.engine.relight(c, s.present.get()); },
-          "condition"_a, nb::call_guard<nb::gil_scoped_release>())
+          "relight",
+          [](Session& s, const Condition& c) {
+            const std::shared_ptr<const Lighting> before = s.present;
+            s.present = Session::without_lock([&] { return s.engine.relight(c, before.get()); });
+          },
+          "condition"_a)
       .def(
           "start_worker", [](Session& s) { s.worker = std::make_unique<RelightWorker>(s.engine, s.present); },
           nb::call_guard<nb::gil_scoped_release>(), "Begins to relight on a thread of its own.")
       .def(
           "stop_worker", [](Session& s) { s.worker.reset(); }, nb::call_guard<nb::gil_scoped_release>())
       .def(
-          "submit", [](Session& s, const Condition& c) { return s.worker->submit(c); }, "condition"_a,
+          "submit", [](Session& s, const Condition& c) { return s.running().submit(c); }, "condition"_a,
           nb::call_guard<nb::gil_scoped_release>(), "Gives the worker a condition; its number.")
       .def(
-          "take_latest", [](Session& s) { return s.take(s.worker->latest()); },
-          nb::call_guard<nb::gil_scoped_release>(),
+          "take_latest", [](Session& s) { return s.take([](RelightWorker& worker) { return worker.latest(); }); },
           "Makes the worker's newest state the present light; number of its condition, and whether it is complete.")
       .def(
-          "take_finished", [](Session& s) { return s.take(s.worker->finished()); },
-          nb::call_guard<nb::gil_scoped_release>(), "The same, once the newest condition is complete.")
+          "take_finished", [](Session& s) { return s.take([](RelightWorker& worker) { return worker.finished(); }); },
+          "The same, once the newest condition is complete.")
       .def(
           "render",
           [](Session& s, const View& view, Visibility visibility, int edge_samples, bool components,
              const SkyPicture& sky) {
-            Frame frame;
-            {
-              const nb::gil_scoped_release release;
-              frame = s.renderer.render(view, *s.present, {visibility, edge_samples, components, &sky});
-            }
+            const std::shared_ptr<const Lighting> light = s.present;
+            Frame frame = Session::without_lock([&] {
+              return s.renderer.render(view, *light, {visibility, edge_samples, components, &sky});
+            });
             nb::dict result;
             const int w = frame.width, h = frame.height;
             result["radiance"] = picture(std::move(frame.radiance), w, h);
@@ -339,14 +283,16 @@ NB_MODULE(_engine, m) {
           "illuminance",
           [](Session& s, In<double, nb::shape<-1, 3>> points, In<float, nb::shape<-1, 3>> normals,
              GatherSamples samples) {
-            std::vector<Irradiance> e;
-            {
-              const nb::gil_scoped_release release;
-              const std::vector<glm::dvec3> places = to_vector<glm::dvec3>(points);
-              const std::vector<glm::vec3> up = to_vector<glm::vec3>(normals);
-              if (!s.sensors.are(places, up, samples)) s.sensors = s.engine.sensors(places, up, samples);
-              e = s.engine.illuminance(*s.present, s.sensors);
-            }
+            const std::vector<glm::dvec3> places = to_vector<glm::dvec3>(points);
+            const std::vector<glm::vec3> up = to_vector<glm::vec3>(normals);
+            const std::shared_ptr<const Lighting> light = s.present;
+            std::shared_ptr<const Sensors> sensors = s.sensors;
+            std::vector<Irradiance> e = Session::without_lock([&] {
+              if (!sensors || !sensors->are(places, up, samples))
+                sensors = std::make_shared<const Sensors>(s.engine.sensors(places, up, samples));
+              return s.engine.illuminance(*light, *sensors);
+            });
+            s.sensors = sensors;
             const std::size_t n = e.size();
             return to_array<float>(std::move(e), {n, 3, 3});
           },

@@ -1,9 +1,12 @@
 #include "transom/engine.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
+#include <sstream>
 
 #include "streams.h"
+#include "transom/error.h"
 #include "transom/overlap.h"
 #include "transom/parallel.h"
 #include "transom/sampling.h"
@@ -16,9 +19,36 @@ constexpr float kPi = std::numbers::pi_v<float>;
 constexpr std::size_t kGrain = 8;
 constexpr double kSmoothTolerance = 1e-3;  // of interreflection, for lights that only have to look like others
 constexpr int kMostCycles = 1000;
+constexpr int kMostElementsPerEdge = 16;  // a byte tells those of a patch apart
 constexpr double kConnectedShare = 0.05;  // emitters up to this share of the interior's area are connected, not hit
 
 }  // namespace
+
+void SolveOptions::validate() const {
+  const auto check = [](bool is_allowed, const char* name, double value, const char* allowed) {
+    if (is_allowed) return;
+    std::ostringstream text;
+    text << name << " is " << value << "; allowed: " << allowed;
+    throw InputError(text.str());
+  };
+  const auto check_count = [&](const char* name, int value, int most) {
+    check(value >= 1 && value <= most, name, value, ("1 to " + std::to_string(most)).c_str());
+  };
+  constexpr int kMost = 1 << 24;
+  check(maximum_edge_m >= 0 && std::isfinite(maximum_edge_m), "maximum_edge_m", static_cast<double>(maximum_edge_m),
+        "0, or a length");
+  check(outdoor_edge_m >= 0 && std::isfinite(outdoor_edge_m), "outdoor_edge_m", static_cast<double>(outdoor_edge_m),
+        "0, or a length");
+  check_count("target_patch_count", target_patch_count, kMost);
+  check_count("elements_per_edge", elements_per_edge, kMostElementsPerEdge);
+  for (const GatherSamples& samples : {patch_samples, node_samples}) {
+    check_count("rays over the hemisphere", samples.hemisphere, kMost);
+    check_count("rays towards openings", samples.openings, kMost);
+  }
+  check_count("panel_rays", panel_rays, kMost);
+  check(node_tolerance > 0, "node_tolerance", static_cast<double>(node_tolerance), "above 0");
+  check(tolerance > 0, "tolerance", tolerance, "above 0");
+}
 
 Engine::Engine(SceneGeometry scene, const SkyBins& sky_bins, SolveOptions options)
     : scene_(std::move(scene)), sky_bins_(sky_bins), options_(options) {
@@ -33,6 +63,7 @@ Engine::Engine(const Engine& solved, SceneGeometry scene)
 }
 
 void Engine::solve(const Engine* solved) {
+  options_.validate();
   trace_.enable(options_.trace);
   {
     const TracePhase phase(trace_, "geometry");

@@ -103,6 +103,7 @@ void Engine::set_product(int opening, Product product) {
     interreflection_->set_reflectance(p, patch_reflectance_[p]);
     if (shooting_) shooting_->set_reflectance(p, patch_reflectance_[p]);
   }
+  interreflection_->foretell();
   if (nodes_ && !scene_.point_sources.empty()) light_always();
 }
 

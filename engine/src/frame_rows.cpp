@@ -42,7 +42,8 @@ void FrameRenderer::find_centre_shares(const Drawing& drawing, std::size_t beam,
     const std::span<float> of_group(shares + group.first - y * width, points.size());
     if (drawing.masks)
       for (std::size_t i = 0; i < points.size(); ++i)
-        of_group[i] = seen.faces(points[i]) ? drawing.mask_share[drawing.masks->index(points[i].pixel, -1)] : 0.f;
+        of_group[i] =
+            seen.faces(points[i]) ? drawing.mask_share[drawing.masks->index(points[i].pixel, BeamPoint::kCentre)] : 0.f;
     else
       seen.find_shares(group.surface, points, of_group, rays);
   }

@@ -162,6 +162,12 @@ void SceneGeometry::validate() const {
     if (material.opening >= static_cast<int>(openings.size()))
       fail("material ", m, " names opening ", material.opening);
   }
+  for (std::size_t s = 0; s < point_sources.size(); ++s) {
+    if (!all_finite(point_sources[s].position)) fail("point source ", s, ": its position is not finite");
+    for (int c = 0; c < 3; ++c)
+      if (const float intensity = point_sources[s].intensity[c]; !(intensity >= 0 && std::isfinite(intensity)))
+        fail("point source ", s, ": intensity ", intensity, " is not a finite number of at least 0");
+  }
   for (std::size_t g = 0; g < openings.size(); ++g) {
     if (openings[g].transmittance.size() < 2)
       fail("opening ", g, ": the transmittance table needs two entries or more");

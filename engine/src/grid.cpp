@@ -46,35 +46,4 @@ glm::vec2 Grid::parameters(CellPoint point) const {
   return (glm::vec2(cell.i, cell.j) + local) / static_cast<float>(u_count);
 }
 
-glm::vec2 Grid::node_parameters(int node) const {
-  if (is_quad) {
-    const int i = node % (u_count + 1), j = node / (u_count + 1);
-    return glm::vec2(i, j) / glm::vec2(u_count, v_count);
-  }
-  int j = 0;
-  while (triangle_node(0, j + 1) <= node && j < u_count) ++j;
-  return glm::vec2(node - triangle_node(0, j), j) / static_cast<float>(u_count);
-}
-
-NodeWeights Grid::interpolate(CellPoint point) const {
-  const glm::vec2 p = point.local;
-  if (is_quad) {
-    const int i = point.cell % u_count, j = point.cell / u_count;
-    const int first = j * (u_count + 1) + i, next_row = first + u_count + 1;
-    return {{first, first + 1, next_row + 1, next_row},
-            {(1 - p.x) * (1 - p.y), p.x * (1 - p.y), p.x * p.y, (1 - p.x) * p.y},
-            4};
-  }
-  const TriangleCell cell = triangle_cell(point.cell);
-  const float first_weight = std::max(0.f, 1 - p.x - p.y);
-  if (!cell.upper)
-    return {{triangle_node(cell.i, cell.j), triangle_node(cell.i + 1, cell.j), triangle_node(cell.i, cell.j + 1), 0},
-            {first_weight, p.x, p.y, 0},
-            3};
-  return {
-      {triangle_node(cell.i + 1, cell.j + 1), triangle_node(cell.i, cell.j + 1), triangle_node(cell.i + 1, cell.j), 0},
-      {first_weight, p.x, p.y, 0},
-      3};
-}
-
 }  // namespace transom

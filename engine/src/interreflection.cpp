@@ -143,12 +143,14 @@ void Interreflection::prepare(std::span<const std::vector<float>> smooth_lights)
       received.push_back(form_factors_.dot(i, light.radiosity) + through_.dot(i, light.radiosity));
     return groups_.grouped(exchange_row(i), lights, received, kLikeness);
   }));
-  double shrinking = 1;
   for (inner_cycles_ = kLeastInnerCycles;; ++inner_cycles_) {
-    shrinking = measured_shrinking();
-    if (shrinking <= kWantedShrinking || inner_cycles_ == kMostInnerCycles) break;
+    foretell();
+    if (foretold_shrinking_ <= kSafety * kWantedShrinking || inner_cycles_ == kMostInnerCycles) break;
   }
-  foretold_shrinking_ = std::min(1., kSafety * shrinking);
+}
+
+void Interreflection::foretell() {
+  foretold_shrinking_ = std::min(1., kSafety * measured_shrinking());
 }
 
 // How much less is left over after a second cycle than after a first, of light on patches here and there.

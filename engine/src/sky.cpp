@@ -17,6 +17,10 @@ float azimuth_of(glm::vec3 direction) {
   return azimuth < 0 ? azimuth + kTwoPi : azimuth;
 }
 
+bool is_unit(glm::vec3 direction) {
+  return std::abs(glm::length(direction) - 1) <= 1e-3f;
+}
+
 }  // namespace
 
 SkyBinIndex::SkyBinIndex(const SkyBins& bins) : row_counts_(bins.row_counts) {
@@ -24,6 +28,9 @@ SkyBinIndex::SkyBinIndex(const SkyBins& bins) : row_counts_(bins.row_counts) {
     throw InputError("sky bins: row_altitude_edges must have one entry more than row_counts");
   int first = 0;
   for (std::size_t row = 0; row < row_counts_.size(); ++row) {
+    if (row_counts_[row] < 1) throw InputError("sky bins: row " + std::to_string(row) + " has no bin");
+    if (!(bins.row_altitude_edges[row] < bins.row_altitude_edges[row + 1]))
+      throw InputError("sky bins: the edges of row " + std::to_string(row) + " do not rise");
     row_sines_.push_back(std::sin(bins.row_altitude_edges[row]));
     row_first_.push_back(first);
     first += row_counts_[row];
@@ -47,17 +54,22 @@ void Condition::validate(int sky_bin_count) const {
     if (!(l >= 0 && std::isfinite(l))) throw InputError("the sky vector holds a value that is negative or not finite");
   for (const std::vector<Beam>* list : {&beams, &sub_suns})
     for (const Beam& beam : *list) {
-      if (!(std::abs(glm::length(beam.direction_to_source) - 1) <= 1e-3f))
-        throw InputError("the direction of a beam is not a unit vector");
+      if (!is_unit(beam.direction_to_source)) throw InputError("the direction of a beam is not a unit vector");
+      if (beam.opening >= 0 && !is_unit(beam.direction_to_sun))
+        throw InputError("the direction from a lobe's panel to the sun is not a unit vector");
+      if (beam.opening >= 0 && list == &sub_suns) throw InputError("a sub-sun is the sun itself, not a lobe of it");
       for (int c = 0; c < 3; ++c)
         if (!(beam.normal_illuminance[c] >= 0 && std::isfinite(beam.normal_illuminance[c])))
           throw InputError("the illuminance of a beam is negative or not finite");
     }
-  for (const Residual& residual : residuals)
+  for (const Residual& residual : residuals) {
+    if (!is_unit(residual.direction_to_sun))
+      throw InputError("the direction from a residual's panel to the sun is not a unit vector");
     for (const glm::vec3& radiance : residual.radiance)
       for (int c = 0; c < 3; ++c)
         if (!(radiance[c] >= 0 && std::isfinite(radiance[c])))
           throw InputError("the residual of a panel holds a value that is negative or not finite");
+  }
   for (int c = 0; c < 3; ++c)
     if (!(ground_luminance[c] >= 0 && std::isfinite(ground_luminance[c])) ||
         !(sky_colour[c] >= 0 && std::isfinite(sky_colour[c])))

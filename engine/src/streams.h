@@ -1,4 +1,4 @@
-/// @file Streams of random numbers: each use of them has its own.
+/// @file Streams of random numbers of a solve, so that its steps do not repeat each other's.
 #pragma once
 
 #include <bit>
@@ -15,7 +15,6 @@ enum Stream : std::uint64_t {
   kNodeStream,
   kBeamStream,
   kSensorStream,
-  kAuditStream,
   kSurveyStream,
   kSourceStream,
   kPanelStream,

@@ -149,6 +149,11 @@ TEST(Validate, NamesWhatIsWrong) {
   bad = scene;
   bad.materials[0].reflectance = glm::vec3(1);
   EXPECT_THROW(make_faces(bad), InputError);
+  bad = scene;
+  bad.point_sources = {{{0.5, 0.5, 0.5}, glm::vec3(-1)}};
+  EXPECT_THROW(make_faces(bad), InputError);
+  bad.point_sources = {{glm::dvec3(std::numeric_limits<double>::infinity()), glm::vec3(1)}};
+  EXPECT_THROW(make_faces(bad), InputError);
 }
 
 }  // namespace

@@ -123,6 +123,42 @@ TEST(Condition, LightThatIsNoNumberIsRefused) {
   for (const Condition& bad : {sky, colour, direction}) EXPECT_THROW(engine.relight(bad), InputError);
 }
 
+TEST(Condition, DirectionsThatAreNoneAreRefused) {
+  const glm::vec3 nowhere(std::numeric_limits<float>::quiet_NaN()), up(0, 0, 1);
+  Condition lobe = uniform_sky(1000), residual = lobe, sub_sun = lobe;
+  lobe.beams.push_back({up, glm::vec3(1), 0, nowhere});
+  residual.residuals.push_back({0, nowhere, {}});
+  sub_sun.sub_suns.push_back({up, glm::vec3(1), 0, up});
+  for (const Condition& bad : {lobe, residual, sub_sun}) EXPECT_THROW(bad.validate(146), InputError);
+}
+
+TEST(SkyBins, RowsThatAreNoneAreRefused) {
+  for (const SkyBins& bad : {SkyBins{{0, 1, 0.5f}, {4, 4}}, SkyBins{{0, 1}, {0}}, SkyBins{{0, 1}, {4, 4}}})
+    EXPECT_THROW(SkyBinIndex{bad}, InputError);
+}
+
+TEST(SolveOptions, WhatNoSolveCanDoWithIsRefusedByName) {
+  const auto message = [](auto change) -> std::string {
+    SolveOptions options;
+    change(options);
+    try {
+      options.validate();
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(message([](SolveOptions&) {}), "");
+  EXPECT_EQ(message([](SolveOptions& o) { o.elements_per_edge = 17; }), "elements_per_edge is 17; allowed: 1 to 16");
+  EXPECT_NE(message([](SolveOptions& o) { o.elements_per_edge = 0; }), "");
+  EXPECT_NE(message([](SolveOptions& o) { o.target_patch_count = 0; }), "");
+  EXPECT_NE(message([](SolveOptions& o) { o.node_samples.hemisphere = 0; }), "");
+  EXPECT_NE(message([](SolveOptions& o) { o.tolerance = 0; }), "");
+  EXPECT_NE(message([&](SolveOptions& o) { o.node_tolerance = nan; }), "");
+  EXPECT_NE(message([&](SolveOptions& o) { o.maximum_edge_m = nan; }), "");
+}
+
 TEST(SkyPicture, WhatIsNoPictureIsRefused) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const SkyPicture dark{{0, 0, 0, 0}, 2, 2}, broken{{1, 1, nan, 1}, 2, 2}, negative{{1, 1, -1, 1}, 2, 2},

@@ -93,6 +93,27 @@ TEST(Nodes, ThatAreAddedShowAContactShadowAsItIsGathered) {
   EXPECT_LT(largest(added), 0.5 * largest(none));
 }
 
+TEST(Nodes, LightDecaysUnderALowSlabAsItDoesBetweenFinerPatches) {
+  // Far below its edge light comes by many reflections between floor and slab, over less than a patch each.
+  SceneGeometry scene = roof_light_room(0.7f);
+  add_box(scene, {1, 1, 0.12}, {3, 3, 0.16}, 0);
+  std::vector<glm::dvec3> points;
+  for (double depth = 0.1; depth < 1; depth += 0.1) points.push_back({1 + depth, 2.03, 0});
+  const auto illuminances = [&](int patches) {
+    SolveOptions finer = options(0.06f);
+    finer.target_patch_count = patches;
+    const Engine engine(scene, tregenza(), finer);
+    const auto light = engine.relight(uniform_sky(1000));
+    return engine.illuminance(*light,
+                              engine.sensors(points, std::vector<glm::vec3>(points.size(), {0, 0, 1}), {8192, 2048}));
+  };
+  const std::vector<Irradiance> coarse = illuminances(1500), fine = illuminances(12000);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const glm::vec3 found = coarse[i].sky + coarse[i].indirect, expected = fine[i].sky + fine[i].indirect;
+    EXPECT_NEAR(found.y / expected.y, 1, 0.08) << points[i].x;
+  }
+}
+
 TEST(Nodes, AreAddedAroundASlabAndNotInTheRestOfTheRoom) {
   Engine empty(roof_light_room(0.5f), tregenza(), options(0.06f));
   Engine furnished(room_with_slab(), tregenza(), options(0.06f));

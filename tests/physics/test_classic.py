@@ -66,6 +66,10 @@ def test_light_found_beside_the_drawing_is_that_of_a_relighting(engines: tuple[E
     assert gather.condition is conditions[-1]
     gather.relight(conditions[-1])
     np.testing.assert_array_equal(beside, gather.render(view).radiance)
+    with pytest.raises(RuntimeError, match="has ended"):
+        relighting.take()
+    with pytest.raises(RuntimeError, match="has ended"):
+        relighting.begin(conditions[0])
 
 
 def test_a_condition_that_cannot_be_is_refused_and_what_is_in_work_goes_on(engines: tuple[Engine, Engine]) -> None:

@@ -38,8 +38,8 @@ class ExactRows {
   std::vector<float> weight_;
 };
 
-/// Compressed sparse rows of weights that are not negative, each off by up to 1/131070 of the largest of its row; the
-/// sum of a row is kept. A sum of some hundred is off by a few 1e-5 of itself.
+/// Compressed sparse rows of weights that are not negative, each rounded by up to 1/131070 of the largest of its row;
+/// then the row is scaled to the sum that it had. A sum of some hundred is off by a few 1e-5 of itself.
 class CompactRows {
  public:
   CompactRows() = default;

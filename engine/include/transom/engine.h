@@ -47,6 +47,9 @@ struct SolveOptions {
   double tolerance = 2.5e-4;     ///< flux in flight at which interreflection stops, relative
   std::uint32_t seed = 1;
   bool trace = false;
+
+  /// Throws InputError, naming the setting, its value and what is allowed.
+  void validate() const;
 };
 
 /// What the solve found and did, for the run bundle.

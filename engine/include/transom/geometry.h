@@ -46,7 +46,7 @@ struct SceneGeometry {
   std::vector<OpeningGroup> openings;
   std::vector<PointSource> point_sources;
 
-  /// Throws InputError for an index out of range, a face without area, a non-finite vertex or an impossible material.
+  /// Throws InputError for an index out of range, a value that is not finite, or an impossible material or source.
   void validate() const;
 };
 

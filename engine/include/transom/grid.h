@@ -1,8 +1,6 @@
-/// @file A regular grid on a quad or a triangle: its cells carry patches or elements, its nodes carry interpolated
-/// light.
+/// @file A regular grid on a quad or a triangle: its cells carry patches or elements.
 #pragma once
 
-#include <array>
 #include <glm/glm.hpp>
 
 namespace transom {
@@ -11,13 +9,6 @@ namespace transom {
 struct CellPoint {
   int cell = 0;
   glm::vec2 local{0};
-};
-
-/// Up to four nodes of a grid and their interpolation weights (sum 1).
-struct NodeWeights {
-  std::array<int, 4> node{};
-  std::array<float, 4> weight{};
-  int count = 0;
 };
 
 /// Grid over the parameters of a face. Quad: (s, t) in the unit square, u_count x v_count cells.
@@ -33,7 +24,6 @@ struct Grid {
   glm::vec2 middle() const { return is_quad ? glm::vec2(0.5f) : glm::vec2(1.f / 3); }
 
   int cell_count() const { return is_quad ? u_count * v_count : u_count * u_count; }
-  int node_count() const { return is_quad ? (u_count + 1) * (v_count + 1) : (u_count + 1) * (u_count + 2) / 2; }
 
   /// The cell that holds the parameters `st` (clamped to the face).
   CellPoint locate(glm::vec2 st) const;
@@ -41,19 +31,12 @@ struct Grid {
   /// Parameters on the face of a point of a cell; inverse of locate.
   glm::vec2 parameters(CellPoint point) const;
 
-  /// Parameters on the face of a node.
-  glm::vec2 node_parameters(int node) const;
-
-  /// Corner nodes of the point's cell with bilinear (quad) or barycentric (triangle) weights.
-  NodeWeights interpolate(CellPoint point) const;
-
  private:
   struct TriangleCell {
     int i, j;
     bool upper;
   };
   TriangleCell triangle_cell(int cell) const;
-  int triangle_node(int i, int j) const { return j * (u_count + 1) - j * (j - 1) / 2 + i; }
 };
 
 }  // namespace transom

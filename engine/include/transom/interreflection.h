@@ -49,8 +49,12 @@ class Interreflection {
             const AfterCycle& after_cycle = {}) const;
 
   /// Replaces the reflectance of one patch. What clusters carry stays as it was prepared: it costs cycles, not
-  /// accuracy.
+  /// accuracy, once that has been foretold.
   void set_reflectance(std::size_t patch, glm::vec3 reflectance) { reflectance_[patch] = reflectance; }
+
+  /// Measures how fast light converges, by which `solve` knows when to stop. To be called when reflectances have been
+  /// replaced.
+  void foretell();
 
   int cluster_count() const { return cluster_count_; }
 

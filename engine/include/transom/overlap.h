@@ -15,7 +15,7 @@ namespace transom {
 void set_back_contacts(Faces& faces);
 
 /// Throws InputError for two faces indoors that lie in one plane (nearer than the lift of ray origins), overlap, and
-/// can are lit where they do: which of them light meets would be chance, and both would receive it. A box that stands
+/// can be lit where they do: which of them light meets would be chance, and both would receive it. A box that stands
 /// on the floor covers it and is no such pair. is_indoors: by face, see survey.h.
 void check_overlaps(const Faces& faces, const std::vector<char>& is_indoors, const RayScene& rays);
 

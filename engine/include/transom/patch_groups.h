@@ -39,7 +39,7 @@ class PatchGroups {
   /// A light whose shape is that of the light of many conditions.
   struct TypicalLight {
     std::vector<float> radiosity;  ///< of patches
-    std::vector<float> deviation;  ///< by group: the most that a patch differs from the mean
+    std::vector<float> deviation;  ///< by group: what its patches differ from their mean by, root mean square
   };
   TypicalLight typical(std::vector<float> radiosity) const;
 
