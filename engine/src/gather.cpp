@@ -20,6 +20,28 @@ constexpr int kMinimumRaysPerTriangle = 4;  // towards an opening triangle above
 constexpr float kNearPatch = 2;             // diameters of a patch up to which its elements are told apart
 constexpr float kPi = std::numbers::pi_v<float>;
 
+// Directions around a point's normal by those samples of `indices` that are below `count`, in order; sixteen at once:
+// visit(directions, how many).
+template <typename Visit>
+void for_directions(const Node& point, const SobolSequence& points, std::span<const std::uint32_t> indices, int count,
+                    const Visit& visit) {
+  const glm::mat3 frame = frame_from_normal(point.normal);
+  Directions directions;
+  std::uint32_t block[kPointsAtOnce];
+  std::size_t size = 0;
+  const auto take = [&] {
+    sample_hemisphere(points, {block, size}, frame, directions);
+    visit(directions, size);
+    size = 0;
+  };
+  for (const std::uint32_t index : indices) {
+    if (index >= static_cast<std::uint32_t>(count)) continue;
+    block[size++] = index;
+    if (size == kPointsAtOnce) take();
+  }
+  if (size > 0) take();
+}
+
 }  // namespace
 
 void merge_shares(std::vector<Share>& shares) {
@@ -61,25 +83,13 @@ GatherRow Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std:
 
 // The same from one point: directions are made and rays cast sixteen at once.
 GatherRow Gatherer::gather_from_point(const Node& point, int count, std::uint32_t seed, Elements told) const {
-  const SobolSequence points(seed);
-  const glm::mat3 frame = frame_from_normal(point.normal);
   HemisphereTally tally;
   tally.slots.reserve(static_cast<std::size_t>(count));
-  std::uint32_t indices[kPointsAtOnce];
-  Directions directions;
-  Hit hits[kPointsAtOnce];
-  auto next = coherent_order(count).begin();
-  for (int begin = 0; begin < count; begin += static_cast<int>(kPointsAtOnce)) {
-    const std::size_t size = std::min(kPointsAtOnce, static_cast<std::size_t>(count - begin));
-    for (std::size_t i = 0; i < size; ++i) {
-      while (*next >= static_cast<std::uint32_t>(count)) ++next;
-      indices[i] = *next++;
-    }
-    sample_hemisphere(points, {indices, size}, frame, directions);
-    rays_.intersect_from(point.position, directions.x, directions.y, directions.z, RayScene::What::kAll, {hits, size});
-    for (std::size_t i = 0; i < size; ++i)
-      add_hit(hits[i], {directions.x[i], directions.y[i], directions.z[i]}, told, tally);
-  }
+  for_directions(point, SobolSequence(seed), coherent_order(count), count, [&](const Directions& to, std::size_t size) {
+    Hit hits[kPointsAtOnce];
+    rays_.intersect_from(point.position, to.x, to.y, to.z, RayScene::What::kAll, {hits, size});
+    for (std::size_t i = 0; i < size; ++i) add_hit(hits[i], {to.x[i], to.y[i], to.z[i]}, told, tally);
+  });
   return std::move(tally).row(count, mesh_.faces().extent);
 }
 
@@ -295,15 +305,9 @@ void Gatherer::add_rays(const OriginOf& origin_of, const SobolSequence& points, 
 // The same from a point, as gather_from_point casts them.
 void Gatherer::add_rays_from_point(const Node& point, const SobolSequence& points,
                                    std::span<const std::uint32_t> indices, int count, std::vector<Ray>& rays) {
-  const glm::mat3 frame = frame_from_normal(point.normal);
-  Directions directions;
-  for (std::size_t begin = 0; begin < indices.size(); begin += kPointsAtOnce) {
-    const auto block = indices.subspan(begin, std::min(kPointsAtOnce, indices.size() - begin));
-    sample_hemisphere(points, block, frame, directions);
-    for (std::size_t k = 0; k < block.size(); ++k)
-      if (block[k] < static_cast<std::uint32_t>(count))
-        rays.push_back({point.position, {directions.x[k], directions.y[k], directions.z[k]}});
-  }
+  for_directions(point, points, indices, count, [&](const Directions& to, std::size_t size) {
+    for (std::size_t i = 0; i < size; ++i) rays.push_back({point.position, {to.x[i], to.y[i], to.z[i]}});
+  });
 }
 
 // Casts those rays again that may meet what has changed, in both states. False: their answers do not go together.
