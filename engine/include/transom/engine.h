@@ -84,8 +84,8 @@ class Engine {
   /// Solves a scene with the options of an engine whose scene was another, and takes over what that found wherever the
   /// edit leaves it valid: equal bit by bit to a fresh solve whose patches have the same longest edges, and faster.
   /// Reflectance, luminance: no ray is cast anew. Glazing, or an opening closed: only rays through openings are. An
-  /// object moved, added or removed: only rays that meet the boxes around it, where it was and where it is, as long as
-  /// the extent of the scene remains.
+  /// object moved, added or removed, or a wall opened: only rays that meet the boxes around it, where it was and where
+  /// it is, as long as the extent of the scene remains; where a wall is opened, those through openings too.
   /// `solved` is not changed and may go. Throws as above.
   Engine(const Engine& solved, SceneGeometry scene);
   ~Engine();
