@@ -4,7 +4,6 @@
 #include <numeric>
 
 #include "deposit_samples.h"
-#include "transom/convex_room.h"
 #include "transom/parallel.h"
 #include "transom/sampling.h"
 
@@ -35,12 +34,13 @@ DirectLight::Receivers DirectLight::receivers(const std::vector<int>& slots,
 }
 
 DirectLight::DirectLight(const LightMesh& mesh, const RayScene& rays, const std::vector<PointSource>& sources,
-                         const std::vector<Material>& materials, float small_opening_m2, std::uint32_t seed)
+                         const std::vector<Material>& materials, float small_opening_m2, bool is_convex,
+                         std::uint32_t seed)
     : mesh_(mesh),
       rays_(rays),
       seed_(seed),
       patterns_(std::make_unique<const Patterns>(seed)),
-      is_convex_(is_convex_room(mesh.faces())),
+      is_convex_(is_convex),
       is_small_opening_(mesh.faces().faces.size(), 0) {
   for (std::size_t f = 0; f < is_small_opening_.size(); ++f) {
     const Face& face = mesh.faces().faces[f];
