@@ -63,6 +63,7 @@ void Engine::solve(const Engine* solved) {
     const TracePhase phase(trace_, "patches");
     patch_of_slot_.assign(static_cast<std::size_t>(mesh_->slot_count()), -1);
     gather_panels();
+    lit_slots_ = slots_lit_by_sources();
     find_patches(first_wave(), known);
     mark_interior();
     find_unseen_patches(known);

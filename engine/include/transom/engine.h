@@ -181,6 +181,7 @@ class Engine {
   int opening_of(int face) const;
   std::vector<int> opening_faces() const;
   Known known_from(const Engine* solved) const;
+  std::vector<int> slots_lit_by_sources() const;
   std::vector<int> first_wave() const;
   PatchRow patch_row(int slot, const Known& known) const;
   std::shared_ptr<const GatherRow> surroundings_of_patch(int slot, const std::shared_ptr<const GatherRow>& known_row,
@@ -260,6 +261,7 @@ class Engine {
   std::vector<glm::vec3> patch_reflectance_, patch_emitted_;
   std::vector<char> is_interior_;
   DirectLight::Receivers receivers_;  // all patches
+  std::vector<int> lit_slots_;        // that point sources light
   std::vector<int> unseen_slots_;     // that see patches indoors and were seen by none
   bool is_grey_scene_ = false;        // all reflectances and emitters
   bool connects_emitters_ = false;    // small emitters: found by connection, not by rays
