@@ -4,7 +4,6 @@
 #include <numeric>
 
 #include "deposit_samples.h"
-#include "transom/convex_room.h"
 #include "transom/parallel.h"
 #include "transom/sampling.h"
 
@@ -35,12 +34,13 @@ DirectLight::Receivers DirectLight::receivers(const std::vector<int>& slots,
 }
 
 DirectLight::DirectLight(const LightMesh& mesh, const RayScene& rays, const std::vector<PointSource>& sources,
-                         const std::vector<Material>& materials, float small_opening_m2, std::uint32_t seed)
+                         const std::vector<Material>& materials, float small_opening_m2, bool is_convex,
+                         std::uint32_t seed)
     : mesh_(mesh),
       rays_(rays),
       seed_(seed),
       patterns_(std::make_unique<const Patterns>(seed)),
-      is_convex_(is_convex_room(mesh.faces())),
+      is_convex_(is_convex),
       is_small_opening_(mesh.faces().faces.size(), 0) {
   for (std::size_t f = 0; f < is_small_opening_.size(); ++f) {
     const Face& face = mesh.faces().faces[f];
@@ -138,20 +138,46 @@ void DirectLight::sources_on_slot(int slot_index, const Corners& corners, glm::v
         point_source_illuminance(points[i], normal) / static_cast<float>(kSourceSamplesPerElement);
 }
 
-// Faces of a cluster look many ways: each sample asks for the light at its own place.
+// Faces of a cluster look many ways: each sample asks for the light at its own place, but for what comes through a
+// small opening first.
 void DirectLight::sources_and_beams_on_cluster(const std::vector<Beam>& beams, int slot,
                                                std::vector<glm::vec3>& sum) const {
   const int per_slot = mesh_.elements_per_slot();
   sum.resize(static_cast<std::size_t>(per_slot), glm::vec3(0));
+  struct Place {
+    int element;
+    glm::vec3 position, normal, illuminance;
+  };
+  std::vector<Place> places;
   for (int e = 0; e < per_slot; ++e) {
     const int element = slot * per_slot + e;
     if (!(mesh_.element_area(element) > 0)) continue;
     const SobolSequence sequence(hash_seed(seed_, static_cast<std::uint64_t>(element)));
     for (std::uint32_t i = 0; i < kSamplesPerElement; ++i) {
-      const Node place = mesh_.place_on_element(element, sequence.point2(i));
-      sum[e] += illuminance(beams, place.position, place.normal) / static_cast<float>(kSamplesPerElement);
+      const auto [position, normal] = mesh_.place_on_element(element, sequence.point2(i));
+      places.push_back({e, position, normal, point_source_illuminance(position, normal)});
     }
   }
+  std::vector<std::size_t> facing;
+  std::vector<glm::vec3> points;
+  std::vector<float> share;
+  for (const Beam& beam : beams) {
+    facing.clear();
+    points.clear();
+    for (std::size_t i = 0; i < places.size(); ++i)
+      if (glm::dot(beam.direction_to_source, places[i].normal) > 0) {
+        facing.push_back(i);
+        points.push_back(places[i].position);
+      }
+    share.resize(points.size());
+    beam_transmission(beam, points, share);
+    if (beam.opening < 0) ignore_small_openings(beam.direction_to_source, Points::of(points), share);
+    for (std::size_t k = 0; k < facing.size(); ++k) {
+      Place& place = places[facing[k]];
+      place.illuminance += beam.normal_illuminance * (glm::dot(beam.direction_to_source, place.normal) * share[k]);
+    }
+  }
+  for (const Place& place : places) sum[place.element] += place.illuminance / static_cast<float>(kSamplesPerElement);
 }
 
 std::vector<LitElement> DirectLight::deposit(const std::vector<Beam>& beams, const Receivers& receivers,

@@ -77,32 +77,23 @@ std::vector<std::vector<glm::vec3>> DirectLight::element_outlines(int slot_index
 void DirectLight::shaft_transmission(const Beam& lobe, std::span<const glm::vec3> points,
                                      std::span<float> share) const {
   thread_local std::vector<Ray> rays;
-  thread_local std::vector<std::size_t> index;
+  thread_local std::vector<std::size_t> point;  // of each ray
+  thread_local std::vector<float> arriving;     // along each that meets nothing
   thread_local std::vector<std::uint8_t> blocked;
   std::fill(share.begin(), share.end(), 0.f);
-  if (points.empty() || !lobe.shafts) return;
+  if (!lobe.shafts) return;
   rays.clear();
-  index.clear();
-  glm::vec3 low = points[0], high = low;
-  for (const glm::vec3& point : points) {
-    low = glm::min(low, point);
-    high = glm::max(high, point);
-  }
-  for (const LightShaft& shaft : *lobe.shafts) {
-    if (!shaft.may_meet(low, high)) continue;
-    const float cosine = -glm::dot(glm::vec3(shaft.plane), lobe.direction_to_source);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (share[i] > 0 || !shaft.holds(points[i])) continue;
-      share[i] = shaft.share;
-      const float distance = glm::dot(shaft.plane, glm::vec4(points[i], 1)) / cosine;
-      rays.push_back({points[i], lobe.direction_to_source, 0, distance - mesh_.faces().ray_offset() / cosine});
-      index.push_back(i);
-    }
-  }
+  point.clear();
+  arriving.clear();
+  find_rays_to_panels(*lobe.shafts, points, mesh_.faces().ray_offset(), [&](std::size_t i, const Ray& ray, float left) {
+    rays.push_back(ray);
+    point.push_back(i);
+    arriving.push_back(left);
+  });
   blocked.resize(rays.size());
   rays_.occluded(RayScene::What::kAll, rays, blocked, RayScene::Order::kCoherent);
   for (std::size_t k = 0; k < rays.size(); ++k)
-    if (blocked[k]) share[index[k]] = 0;
+    if (!blocked[k] && share[point[k]] == 0) share[point[k]] = arriving[k];
 }
 
 // Receivers whose corners' box a shaft may meet, on the side that faces the lobe.
@@ -160,17 +151,13 @@ void DirectLight::lobe_on_slot(const Beam& lobe, int slot_index, const Corners& 
         parts.push_back({static_cast<int>(e), std::move(inside), static_cast<float>(std::min(share, 1.0))});
     }
     if (parts.empty()) continue;
-    const float cosine = -glm::dot(glm::vec3(shaft.plane), lobe.direction_to_source);
     const auto cast = [&](std::uint32_t count) {
       rays.clear();
       for (const LitPart& part : parts) {
         const SobolSequence sequence(
             hash_seed(seed_, static_cast<std::uint64_t>(slot_index) * mesh_.elements_per_slot() + part.element));
-        for (std::uint32_t i = 0; i < count; ++i) {
-          const glm::vec3 point = point_of(part.corner, sequence.point2(i));
-          const float distance = glm::dot(shaft.plane, glm::vec4(point, 1)) / cosine;
-          rays.push_back({point, lobe.direction_to_source, 0, distance - mesh_.faces().ray_offset() / cosine});
-        }
+        for (std::uint32_t i = 0; i < count; ++i)
+          rays.push_back(shaft.ray_to_panel(point_of(part.corner, sequence.point2(i)), mesh_.faces().ray_offset()));
       }
       blocked.resize(rays.size());
       rays_.occluded(RayScene::What::kAll, rays, blocked, RayScene::Order::kCoherent);

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "streams.h"
+#include "transom/convex_room.h"
 #include "transom/error.h"
 #include "transom/overlap.h"
 #include "transom/parallel.h"
@@ -82,16 +83,18 @@ void Engine::solve(const Engine* solved) {
     gatherer_ = std::make_unique<Gatherer>(*mesh_, *rays_, scene_.materials, scene_.openings, *sky_index_, *panels_);
     const float element_edge = facts_.maximum_edge_m / static_cast<float>(options_.elements_per_edge);
     const std::uint32_t beam_seed = hash_seed(options_.seed, kBeamStream);
+    const bool is_convex = is_convex_room(faces_);
     direct_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, scene_.point_sources, scene_.materials,
-                                                  element_edge * element_edge, beam_seed);
+                                                  element_edge * element_edge, is_convex, beam_seed);
     beam_light_ = std::make_unique<DirectLight>(*mesh_, *rays_, std::vector<PointSource>{}, scene_.materials,
-                                                element_edge * element_edge, beam_seed);
+                                                element_edge * element_edge, is_convex, beam_seed);
   }
   Known known = known_from(solved);
   {
     const TracePhase phase(trace_, "patches");
     patch_of_slot_.assign(static_cast<std::size_t>(mesh_->slot_count()), -1);
     gather_panels();
+    lit_slots_ = slots_lit_by_sources();
     find_patches(first_wave(), known);
     mark_interior();
     find_unseen_patches(known);

@@ -111,26 +111,32 @@ void Engine::set_product(int opening, Product product) {
 // the sun reaches.
 void Engine::find_shafts(Condition& condition, std::vector<glm::vec3>& residual) const {
   const TracePhase phase(trace_, "shafts");
-  std::map<std::tuple<int, float, float, float>, std::vector<SunlitPiece>> pieces_of;  // by face and sun
-  const auto pieces_at = [&](int face, glm::vec3 sun) -> const std::vector<SunlitPiece>& {
-    const auto [entry, is_new] = pieces_of.try_emplace({face, sun.x, sun.y, sun.z});
-    if (is_new) entry->second = sunlit_pieces(faces_, scene_.materials, scene_.openings, face, glm::dvec3(sun));
+  const std::vector<Panel>& panels = panels_->all();
+  // Of the panels of an opening group, by panel; others have none.
+  using Pieces = std::vector<std::vector<SunlitPiece>>;
+  std::map<std::tuple<int, float, float, float>, Pieces> pieces_of;  // by opening group and sun
+  const auto pieces_at = [&](int opening, glm::vec3 sun) -> const Pieces& {
+    const auto [entry, is_new] = pieces_of.try_emplace({opening, sun.x, sun.y, sun.z}, panels.size());
+    if (!is_new) return entry->second;
+    const SunlitFaces sunlit(faces_, scene_.materials, scene_.openings, glm::dvec3(sun));
+    parallel_indices(panels.size(), 1, [&, &pieces = entry->second](std::size_t k) {
+      if (panels[k].opening == opening) pieces[k] = sunlit.pieces(panels[k].face);
+    });
     return entry->second;
   };
   for (Beam& beam : condition.beams) {
     if (beam.opening < 0) continue;
     if (!has_panel(scene_, beam.opening)) fail(beam.opening, "a lobe needs panels");
     const auto shafts = std::make_shared<std::vector<LightShaft>>();
-    const bool is_dark = beam.normal_illuminance == glm::vec3(0);
-    for (const Panel& panel : panels_->all()) {
-      if (panel.opening != beam.opening || is_dark) continue;
-      const glm::dvec3 normal(faces_.faces[static_cast<std::size_t>(panel.face)].normal),
+    beam.shafts = shafts;
+    if (beam.normal_illuminance == glm::vec3(0)) continue;
+    const Pieces& pieces = pieces_at(beam.opening, beam.direction_to_sun);
+    for (std::size_t k = 0; k < panels.size(); ++k) {
+      const glm::dvec3 normal(faces_.faces[static_cast<std::size_t>(panels[k].face)].normal),
           back(beam.direction_to_source);
       if (!(glm::dot(normal, back) > kGrazingCosine)) continue;  // it turns away from the room
-      for (const SunlitPiece& piece : pieces_at(panel.face, beam.direction_to_sun))
-        shafts->push_back(light_shaft(piece, normal, back));
+      for (const SunlitPiece& piece : pieces[k]) shafts->push_back(light_shaft(piece, normal, back));
     }
-    beam.shafts = shafts;
   }
   residual.assign(static_cast<std::size_t>(panels_->bin_count()), glm::vec3(0));
   for (const Residual& rest : condition.residuals) {
@@ -139,12 +145,12 @@ void Engine::find_shafts(Condition& condition, std::vector<glm::vec3>& residual)
     if (static_cast<int>(rest.radiance.size()) != bins)
       fail(rest.opening,
            "a residual has " + std::to_string(rest.radiance.size()) + " bins, not " + std::to_string(bins));
-    for (const Panel& panel : panels_->all()) {
-      if (panel.opening != rest.opening) continue;
-      const double share = sunlit_share(faces_.faces[static_cast<std::size_t>(panel.face)],
-                                        pieces_at(panel.face, rest.direction_to_sun));
+    const Pieces& pieces = pieces_at(rest.opening, rest.direction_to_sun);
+    for (std::size_t k = 0; k < panels.size(); ++k) {
+      if (panels[k].opening != rest.opening) continue;
+      const double share = sunlit_share(faces_.faces[static_cast<std::size_t>(panels[k].face)], pieces[k]);
       for (int bin = 0; bin < bins; ++bin)
-        residual[static_cast<std::size_t>(panel.first_bin + bin)] +=
+        residual[static_cast<std::size_t>(panels[k].first_bin + bin)] +=
             static_cast<float>(share) * rest.radiance[static_cast<std::size_t>(bin)];
     }
   }

@@ -36,11 +36,9 @@ std::vector<int> Engine::first_slots() const {
   return slots;
 }
 
-// Where the search for patches starts: first_slots, what panels see outdoors, and what point sources light.
-std::vector<int> Engine::first_wave() const {
-  std::vector<int> wave = first_slots();
-  for (const GatherRow& row : panel_rows_)
-    for (const Share& share : row.through) wave.push_back(share.index);
+// The slots that rays from point sources meet first.
+std::vector<int> Engine::slots_lit_by_sources() const {
+  std::vector<int> slots;
   for (std::size_t i = 0; i < scene_.point_sources.size(); ++i) {
     const SobolSequence points(hash_seed(options_.seed, kSourceStream + i));
     std::vector<Ray> rays;
@@ -53,8 +51,17 @@ std::vector<int> Engine::first_wave() const {
     std::vector<Hit> hits(rays.size());
     rays_->intersect(RayScene::What::kAll, rays, hits);
     for (const Hit& hit : hits)
-      if (hit.face >= 0 && !faces_.is_inside_solid(hit.face, hit.side)) wave.push_back(mesh_->slot_at(hit));
+      if (hit.face >= 0 && !faces_.is_inside_solid(hit.face, hit.side)) slots.push_back(mesh_->slot_at(hit));
   }
+  return slots;
+}
+
+// Where the search for patches starts: first_slots, what panels see outdoors, and what point sources light.
+std::vector<int> Engine::first_wave() const {
+  std::vector<int> wave = first_slots();
+  for (const GatherRow& row : panel_rows_)
+    for (const Share& share : row.through) wave.push_back(share.index);
+  wave.insert(wave.end(), lit_slots_.begin(), lit_slots_.end());
   std::sort(wave.begin(), wave.end());
   wave.erase(std::unique(wave.begin(), wave.end()), wave.end());
   return wave;
@@ -158,9 +165,8 @@ void Engine::mark_interior() {
   const auto patch_at = [&](const Share& share) { return patch_of_slot_[share.index]; };
   for (const int patch : std::vector<int>(stack))
     for (const Share& share : patch_rows_[patch].around->reached) mark(patch_at(share));
-  for (const int slot : unseen_slots_) mark(patch_of_slot_[slot]);
-  if (!scene_.point_sources.empty())
-    for (std::size_t p = 0; p < patch_rows_.size(); ++p) mark(static_cast<int>(p));
+  for (const std::vector<int>* slots : {&lit_slots_, &unseen_slots_})
+    for (const int slot : *slots) mark(patch_of_slot_[slot]);
   // What a patch indoors sees is indoors if it sees a patch indoors itself. One ray that slips through an edge, between
   // slivers, meets the outside of a wall, which does not look back.
   std::vector<int> pending;

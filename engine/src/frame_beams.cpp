@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <numbers>
+#include <utility>
 
 #include "transom/parallel.h"
 
@@ -19,8 +20,9 @@ void ShadowRays::trace(const RayScene& scene, RayScene::What what) {
   blocked_.resize(rays_.size());
   scene.occluded(what, rays_, blocked_, RayScene::Order::kCoherent);
   for (std::size_t i = 0; i < rays_.size(); ++i)
-    if (blocked_[i]) *shares_[i] = 0;
+    if (!blocked_[i] && *shares_[i] == 0) *shares_[i] = arriving_[i];
   rays_.clear();
+  arriving_.clear();
   shares_.clear();
 }
 
@@ -120,28 +122,21 @@ void SeenBeam::find_shares_of_sun(int surface, std::span<const BeamPoint> points
   }
   for (std::size_t i = 0; i < count; ++i) {
     if (!is_reached[i]) shares[i] = 0;
-    if (shares[i] > 0) rays.add({points[i].position, beam_->direction_to_source}, &shares[i]);
+    const float arriving = std::exchange(shares[i], 0.f);
+    if (arriving > 0) rays.add({points[i].position, beam_->direction_to_source}, arriving, &shares[i]);
   }
 }
 
 void SeenBeam::find_shares_of_lobe(std::span<const BeamPoint> points, std::span<float> shares, ShadowRays& rays) const {
-  glm::vec3 low = points[0].position, high = low;
+  std::array<glm::vec3, kChunk> positions;
   for (std::size_t i = 0; i < points.size(); ++i) {
     shares[i] = 0;
-    low = glm::min(low, points[i].position);
-    high = glm::max(high, points[i].position);
+    positions[i] = points[i].position;
   }
-  for (const LightShaft& shaft : *beam_->shafts) {
-    if (!shaft.may_meet(low, high)) continue;
-    const float cosine = -glm::dot(glm::vec3(shaft.plane), beam_->direction_to_source);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (shares[i] > 0 || !faces(points[i]) || !shaft.holds(points[i].position)) continue;
-      shares[i] = shaft.share;
-      const float distance = glm::dot(shaft.plane, glm::vec4(points[i].position, 1)) / cosine;
-      rays.add({points[i].position, beam_->direction_to_source, 0, distance - engine_->faces().ray_offset() / cosine},
-               &shares[i]);
-    }
-  }
+  find_rays_to_panels(*beam_->shafts, {positions.data(), points.size()}, engine_->faces().ray_offset(),
+                      [&](std::size_t i, const Ray& ray, float arriving) {
+                        if (faces(points[i])) rays.add(ray, arriving, &shares[i]);
+                      });
 }
 
 }  // namespace transom

@@ -15,16 +15,18 @@ namespace transom {
 /// Rays towards a source, collected so that they are traced sixteen at a time.
 class ShadowRays {
  public:
-  /// share: what arrives at the start of the ray if nothing is in its way.
-  void add(const Ray& ray, float* share) {
+  /// arriving: at the start of the ray if nothing is in its way. share: 0 until then.
+  void add(const Ray& ray, float arriving, float* share) {
     rays_.push_back(ray);
+    arriving_.push_back(arriving);
     shares_.push_back(share);
   }
-  /// Sets the shares to 0 whose rays meet something, and forgets them all.
+  /// Sets every share to what arrives along the first of its rays that meets nothing, and forgets them all.
   void trace(const RayScene& scene, RayScene::What what);
 
  private:
   std::vector<Ray> rays_;
+  std::vector<float> arriving_;
   std::vector<float*> shares_;
   std::vector<std::uint8_t> blocked_;
 };
@@ -42,8 +44,8 @@ class SeenBeam {
   /// Whether points of a group may be lit.
   bool may_light(const BeamGroup& group) const;
 
-  /// Share of the beam that arrives at points of one surface. Where `rays` are added it is so if they meet nothing, and
-  /// 0 else: shares must stay where they are until these are traced.
+  /// Share of the beam that arrives at points of one surface, once `rays` have been traced: 0 until then, and shares
+  /// must stay where they are.
   void find_shares(int surface, std::span<const BeamPoint> points, std::span<float> shares, ShadowRays& rays) const;
   void trace(ShadowRays& rays) const;
 

@@ -244,6 +244,7 @@ Faces make_faces(const SceneGeometry& scene) {
     face.source = piece.source;
     face.is_quad = piece.is_quad;
     face.material = scene.face_material[piece.source];
+    face.is_opening = scene.materials[face.material].opening >= 0;
     const glm::dvec3* corner = piece.corner;
     const glm::dvec3 twice_area = face.is_quad ? glm::cross(corner[2] - corner[0], corner[3] - corner[1])
                                                : glm::cross(corner[1] - corner[0], corner[2] - corner[0]);

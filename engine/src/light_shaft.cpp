@@ -28,6 +28,7 @@ bool LightShaft::may_meet(glm::vec3 low, glm::vec3 high) const {
 
 LightShaft light_shaft(const SunlitPiece& piece, glm::dvec3 normal, glm::dvec3 direction_to_source) {
   LightShaft shaft;
+  shaft.direction_to_source = glm::vec3(direction_to_source);
   shaft.share = piece.share;
   glm::dvec3 middle(0);
   for (const glm::dvec3& corner : piece.corner) {

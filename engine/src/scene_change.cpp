@@ -78,7 +78,8 @@ SceneChange::SceneChange(const LightMesh& before, const LightMesh& after)
   enclose(std::move(boxes));
 }
 
-// Faces in the same place, first to first where there are several.
+// Faces in the same place, first to first where there are several. What has been seen through an opening is known to
+// be so and can be asked for again when it is closed; what a wall has hidden is not, when it is opened.
 void SceneChange::match_faces(const LightMesh& before, const LightMesh& after) {
   const std::vector<Face>&old_faces = before.faces().faces, &new_faces = after.faces().faces;
   std::vector<std::pair<std::uint64_t, int>> by_place;
@@ -91,6 +92,7 @@ void SceneChange::match_faces(const LightMesh& before, const LightMesh& after) {
          entry != by_place.end() && entry->first == hash; ++entry) {
       const auto other = static_cast<std::size_t>(entry->second);
       if (face_after_[other] >= 0 || !is_same_place(old_faces[other], new_faces[f]) ||
+          (!old_faces[other].is_opening && new_faces[f].is_opening) ||
           is_solid(before.faces(), other) != is_solid(after.faces(), f) ||
           before.grid(entry->second) != after.grid(static_cast<int>(f)))
         continue;

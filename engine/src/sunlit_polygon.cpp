@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "transom/ray_scene.h"
+#include "transom/sampling.h"
+
 namespace transom {
 namespace {
 
@@ -90,33 +93,51 @@ void cast_shadow(const std::vector<Plane>& sides, float transmitted, double smal
 
 }  // namespace
 
-std::vector<SunlitPiece> sunlit_pieces(const Faces& faces, const std::vector<Material>& materials,
-                                       const std::vector<OpeningGroup>& openings, int face_index,
-                                       glm::dvec3 direction_to_sun) {
-  const Face& face = faces.faces[static_cast<std::size_t>(face_index)];
+SunlitFaces::SunlitFaces(const Faces& faces, const std::vector<Material>& materials,
+                         const std::vector<OpeningGroup>& openings, glm::dvec3 direction_to_sun)
+    : faces_(faces), materials_(materials), openings_(openings), sun_(direction_to_sun) {
+  const glm::dmat3 along_sun = glm::transpose(glm::dmat3(frame_from_normal(glm::vec3(direction_to_sun))));
+  const double margin = faces.ray_offset();  // large against the rounding of axes
+  boxes_.reserve(faces.faces.size());
+  for (const Face& face : faces.faces) {
+    Box box{glm::dvec3(Ray::kInfinity), glm::dvec3(-Ray::kInfinity)};
+    for (const glm::vec3& corner : face.corners()) {
+      const glm::dvec3 place = along_sun * glm::dvec3(corner);
+      box.low = glm::min(box.low, place - margin);
+      box.high = glm::max(box.high, place + margin);
+    }
+    boxes_.push_back(box);
+  }
+}
+
+std::vector<SunlitPiece> SunlitFaces::pieces(int face_index) const {
+  const auto number = static_cast<std::size_t>(face_index);
+  const Face& face = faces_.faces[number];
   const glm::dvec3 normal(face.normal);
-  if (glm::dot(normal, direction_to_sun) <= 0) return {};
+  if (glm::dot(normal, sun_) <= 0) return {};
   const Polygon panel = corners_of(face);
-  const std::vector<Plane> sides = sides_along(panel, direction_to_sun);
-  const double smallest = kSmallestPiece * static_cast<double>(face.area), margin = faces.ray_offset();
+  const std::vector<Plane> sides = sides_along(panel, sun_);
+  const double smallest = kSmallestPiece * static_cast<double>(face.area), margin = faces_.ray_offset();
   const Plane before{normal, -glm::dot(normal, panel[0])};
+  Box towards_sun = boxes_[number];
+  towards_sun.high.z = Ray::kInfinity;
   std::vector<SunlitPiece> pieces{{panel, 1.f}};
-  Polygon caster, behind;
-  for (std::size_t f = 0; f < faces.faces.size() && !pieces.empty(); ++f) {
-    const Face& other = faces.faces[f];
-    const double cosine = glm::dot(glm::dvec3(other.normal), direction_to_sun);
-    if (static_cast<int>(f) == face_index || std::abs(cosine) < kEdgeOnCosine) continue;
-    caster = corners_of(other);
+  Polygon front, behind;
+  for (std::size_t f = 0; f < faces_.faces.size() && !pieces.empty(); ++f) {
+    if (f == number || !overlap(boxes_[f], towards_sun)) continue;
+    const Face& other = faces_.faces[f];
+    const double cosine = glm::dot(glm::dvec3(other.normal), sun_);
+    if (std::abs(cosine) < kEdgeOnCosine) continue;
+    const Polygon caster = corners_of(other);
     if (all_below(caster, before, margin) ||
         std::any_of(sides.begin(), sides.end(), [&](const Plane& side) { return all_below(caster, side, 0); }))
       continue;
-    Polygon front;
     split(caster, before, front, behind);
     if (front.size() < 3) continue;
-    const int opening = materials[static_cast<std::size_t>(other.material)].opening;
+    const int opening = materials_[static_cast<std::size_t>(other.material)].opening;
     const float transmitted =
-        opening < 0 ? 0.f : openings[static_cast<std::size_t>(opening)].transmittance_at(static_cast<float>(cosine));
-    cast_shadow(sides_along(front, direction_to_sun), transmitted, smallest, pieces);
+        opening < 0 ? 0.f : openings_[static_cast<std::size_t>(opening)].transmittance_at(static_cast<float>(cosine));
+    cast_shadow(sides_along(front, sun_), transmitted, smallest, pieces);
   }
   return pieces;
 }

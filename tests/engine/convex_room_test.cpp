@@ -28,6 +28,20 @@ SceneGeometry turned(SceneGeometry scene) {
   return scene;
 }
 
+// A sphere without its poles, in rows of trapezoids.
+SceneGeometry sphere(int rows) {
+  SceneGeometry scene;
+  scene.materials = {test::diffuse(0.5f)};
+  const auto at = [&](int row, int column) {
+    const double polar = 3.14159265 * row / rows, azimuth = 3.14159265 * column / rows;
+    return glm::dvec3(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar));
+  };
+  for (int row = 1; row < rows - 1; ++row)
+    for (int column = 0; column < 2 * rows; ++column)
+      add_quad(scene, at(row, column), at(row + 1, column), at(row + 1, column + 1), at(row, column + 1), 0);
+  return scene;
+}
+
 bool is_convex(const SceneGeometry& scene) {
   return is_convex_room(make_faces(scene));
 }
@@ -47,6 +61,23 @@ TEST(ConvexRoom, WhatStandsInsideOrOutsideOrInTheOpeningMakesItNotConvex) {
     EXPECT_FALSE(is_convex(scene));
     EXPECT_FALSE(is_convex(turned(scene)));
   }
+}
+
+TEST(ConvexRoom, FacesOfOnePlaneCountOnceAndMoreThanSomeHundredPlanesAreNotLookedAt) {
+  SceneGeometry divided;
+  divided.materials = {test::diffuse(0.5f)};
+  const int count = 20;
+  for (int i = 0; i < count * count; ++i) {
+    const double x = i % count, y = i / count, high = count;
+    add_quad(divided, {x, y, 0}, {x + 1, y, 0}, {x + 1, y + 1, 0}, {x, y + 1, 0}, 0);
+    add_quad(divided, {x, y, high}, {x + 1, y, high}, {x + 1, y + 1, high}, {x, y + 1, high}, 0);
+    add_quad(divided, {x, 0, y}, {x + 1, 0, y}, {x + 1, 0, y + 1}, {x, 0, y + 1}, 0);
+    add_quad(divided, {x, high, y}, {x + 1, high, y}, {x + 1, high, y + 1}, {x, high, y + 1}, 0);
+  }
+  EXPECT_TRUE(is_convex(divided));
+  EXPECT_TRUE(is_convex(turned(divided)));
+  EXPECT_TRUE(is_convex(sphere(8)));
+  EXPECT_FALSE(is_convex(sphere(16)));
 }
 
 TEST(ConvexRoom, LightIsBitByBitThatFoundByRays) {

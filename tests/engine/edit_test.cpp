@@ -1,6 +1,8 @@
 // An edited scene, solved with what an earlier solve found, against the same scene solved afresh.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "rooms.h"
 #include "transom/engine.h"
 
@@ -128,6 +130,23 @@ TEST(Edit, AnOpeningClosedByAnOpaqueSurfaceIsThatOfAFreshSolve) {
       if (scene.materials[scene.face_material[f]].opening >= 0) scene.face_material[f] = 2;
   });
   EXPECT_GT(facts.kept_patch_rows, facts.patch_count / 2);
+}
+
+// One half of the roof light is shut. What hangs outdoors is seen through the other.
+TEST(Edit, AnOpaqueSurfaceThatIsOpenedBesideAnOpeningIsThatOfAFreshSolveAndSoIsTheWayBack) {
+  SceneGeometry open = furnished_room();
+  const auto roof_light = std::find(open.face_material.begin(), open.face_material.end(), 1);
+  const auto number = static_cast<std::size_t>(roof_light - open.face_material.begin());
+  open.faces.erase(open.faces.begin() + static_cast<std::ptrdiff_t>(number));
+  open.face_material.erase(roof_light);
+  add_quad(open, {1, 1, 3}, {2, 1, 3}, {2, 3, 3}, {1, 3, 3}, 1);
+  add_quad(open, {2, 1, 3}, {3, 1, 3}, {3, 3, 3}, {2, 3, 3}, 1);
+  SceneGeometry shut = open;
+  shut.face_material.back() = 2;
+  const Engine before(shut, tregenza(), options());
+  const Engine opened(before, open), fresh(open, tregenza(), same_edges(before));
+  expect_equal_light(opened, fresh);
+  expect_equal_light(Engine(fresh, shut), before);
 }
 
 // Rows that are begun from known ones, of patches and nodes, where a small object changes.

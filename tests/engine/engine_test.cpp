@@ -179,5 +179,26 @@ TEST(Engine, PartitionCastsNoLightThroughItself) {
   EXPECT_LT((e[0].sky + e[0].indirect).y, 1e-3f * e[1].sky.y);
 }
 
+TEST(Engine, ALampIndoorsMakesNoRoomOfTheGroundOutdoors) {
+  SceneGeometry scene = roof_light_room(0.5f, 0.8f);
+  scene.materials.push_back(diffuse(0.2f));
+  test::add_quad(scene, {-9, -9, -1}, {9, -9, -1}, {9, 9, -1}, {-9, 9, -1}, 2);
+  add_box(scene, {1.2, 1.2, 5}, {2, 2, 6}, 2);  // seen through the roof light, and sees the ground
+  scene.point_sources.push_back({{2, 2, 1}, glm::vec3(100)});
+  const Engine engine(scene, tregenza(), small_options());
+  int outdoor_count = 0;
+  for (std::size_t p = 0; p < engine.patch_slots().size(); ++p) {
+    const Slot slot = engine.mesh().slot(engine.patch_slots()[p]);
+    const Face& face = engine.faces().faces[slot.face];
+    const bool is_outdoors = face.material == 2, is_floor = face.source == 0 && slot.side == 0;
+    EXPECT_FALSE(is_outdoors && engine.is_interior(p)) << p;
+    EXPECT_TRUE(!is_floor || engine.is_interior(p)) << p;
+    outdoor_count += is_outdoors;
+  }
+  EXPECT_GT(outdoor_count, 0);
+  const EnergyAudit audit = engine.audit(*engine.relight(uniform_sky(0)), 1 << 14);
+  EXPECT_NEAR((audit.absorbed + audit.out).y / audit.in().y, 1, 0.01f);
+}
+
 }  // namespace
 }  // namespace transom

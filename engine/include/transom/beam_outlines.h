@@ -40,6 +40,12 @@ class BeamOutlines {
   struct Points {
     std::vector<float> x, y, z;
 
+    static Points of(std::span<const glm::vec3> positions) {
+      Points points;
+      points.resize(positions.size());
+      for (std::size_t i = 0; i < positions.size(); ++i) points.set(i, positions[i]);
+      return points;
+    }
     void resize(std::size_t count) {
       for (std::vector<float>* list : {&x, &y, &z}) list->resize(count);
     }

@@ -34,9 +34,10 @@ struct BeamPlan {
 /// its way to the sun, so that none is counted twice. Lobes come in shafts, whose part of an element is found exactly.
 class DirectLight {
  public:
-  /// small_opening_m2: area of an element; opening faces below it send their light themselves. seed: of all samples.
+  /// small_opening_m2: area of an element; opening faces below it send their light themselves. is_convex: as
+  /// is_convex_room has it. seed: of all samples.
   DirectLight(const LightMesh& mesh, const RayScene& rays, const std::vector<PointSource>& sources,
-              const std::vector<Material>& materials, float small_opening_m2, std::uint32_t seed);
+              const std::vector<Material>& materials, float small_opening_m2, bool is_convex, std::uint32_t seed);
   ~DirectLight();
 
   /// Patches that receive light, and what of them every beam needs.

@@ -87,8 +87,8 @@ class Engine {
   /// Solves a scene with the options of an engine whose scene was another, and takes over what that found wherever the
   /// edit leaves it valid: equal bit by bit to a fresh solve whose patches have the same longest edges, and faster.
   /// Reflectance, luminance: no ray is cast anew. Glazing, or an opening closed: only rays through openings are. An
-  /// object moved, added or removed: only rays that meet the boxes around it, where it was and where it is, as long as
-  /// the extent of the scene remains.
+  /// object moved, added or removed, or a wall opened: only rays that meet the boxes around it, where it was and where
+  /// it is, as long as the extent of the scene remains; where a wall is opened, those through openings too.
   /// `solved` is not changed and may go. Throws as above.
   Engine(const Engine& solved, SceneGeometry scene);
   ~Engine();
@@ -184,6 +184,7 @@ class Engine {
   int opening_of(int face) const;
   std::vector<int> opening_faces() const;
   Known known_from(const Engine* solved) const;
+  std::vector<int> slots_lit_by_sources() const;
   std::vector<int> first_wave() const;
   PatchRow patch_row(int slot, const Known& known) const;
   std::shared_ptr<const GatherRow> surroundings_of_patch(int slot, const std::shared_ptr<const GatherRow>& known_row,
@@ -263,6 +264,7 @@ class Engine {
   std::vector<glm::vec3> patch_reflectance_, patch_emitted_;
   std::vector<char> is_interior_;
   DirectLight::Receivers receivers_;  // all patches
+  std::vector<int> lit_slots_;        // that point sources light
   std::vector<int> unseen_slots_;     // that see patches indoors and were seen by none
   bool is_grey_scene_ = false;        // all reflectances and emitters
   bool connects_emitters_ = false;    // small emitters: found by connection, not by rays

@@ -62,6 +62,7 @@ struct Face {
   float area = 0;
   bool is_quad = false;
   bool is_parallelogram = false;
+  bool is_opening = false;
   bool is_set_back = false;  ///< of a solid that stands on another face, or stands under it: see set_back_contacts
   int material = 0;
   int source = 0;     ///< face of the scene that this is, or is a piece of

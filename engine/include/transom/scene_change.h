@@ -15,8 +15,8 @@ namespace transom {
 class HemisphereCells;
 
 /// Two states of a scene compared. A face stays if it is in the same place with the same cells, of whatever material
-/// and number, and is as solid as it was; a slot stays with its face. What has changed is all in a few boxes: a ray
-/// that meets none of them meets the same places in both states.
+/// and number, is as solid as it was, and is no wall that has become an opening; a slot stays with its face. What has
+/// changed is all in a few boxes: a ray that meets none of them meets the same places in both states.
 ///
 /// Slots are numbered as in the later state where nothing else is said.
 class SceneChange {
