@@ -5,7 +5,6 @@
 #include "streams.h"
 #include "transom/engine.h"
 #include "transom/parallel.h"
-#include "transom/sampling.h"
 
 namespace transom {
 namespace {

@@ -1,6 +1,5 @@
 #include "transom/panels.h"
 
-#include <algorithm>
 #include <numbers>
 
 #include "transom/sampling.h"

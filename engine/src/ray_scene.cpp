@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "embree_device.h"
-#include "transom/error.h"
 
 namespace transom {
 namespace {

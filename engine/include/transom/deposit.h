@@ -2,8 +2,10 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <map>
+#include <memory>
 #include <span>
 #include <vector>
 

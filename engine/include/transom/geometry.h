@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "transom/angle_bins.h"
-#include "transom/grid.h"
 
 namespace transom {
 

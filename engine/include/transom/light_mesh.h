@@ -6,6 +6,7 @@
 
 #include "transom/face_clusters.h"
 #include "transom/geometry.h"
+#include "transom/grid.h"
 #include "transom/ray_scene.h"
 
 namespace transom {
