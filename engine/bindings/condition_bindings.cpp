@@ -27,18 +27,14 @@ void bind_condition(nb::module_& m) {
              std::tuple<float, float, float> ground_luminance) {
             new (self) Condition{};
             self->sky_luminance = to_vector<float>(sky_luminance);
-            const auto [sr, sg, sb] = sky_colour;
-            self->sky_colour = {sr, sg, sb};
-            const auto [gr, gg, gb] = ground_luminance;
-            self->ground_luminance = {gr, gg, gb};
+            self->sky_colour = vector_of(sky_colour);
+            self->ground_luminance = vector_of(ground_luminance);
           },
           "sky_luminance"_a, "sky_colour"_a, "ground_luminance"_a)
       .def(
           "add_beam",
           [](Condition& c, std::tuple<float, float, float> direction, std::tuple<float, float, float> illuminance) {
-            const auto [x, y, z] = direction;
-            const auto [r, g, b] = illuminance;
-            c.beams.push_back({{x, y, z}, {r, g, b}});
+            c.beams.push_back({vector_of(direction), vector_of(illuminance)});
           },
           "direction_to_source"_a, "normal_illuminance"_a)
       .def(

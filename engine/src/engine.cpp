@@ -103,8 +103,7 @@ void Engine::solve(const Engine* solved) {
   }
   {
     const TracePhase phase(trace_, "transfer");
-    SparseRows patch_sky;
-    assemble_transfer(known, patch_sky);
+    SparseRows patch_sky = assemble_transfer(known);
     link_panels(patch_sky);
     patch_sky_ = SkyRows(patch_sky, ground_bin());
   }
@@ -182,7 +181,9 @@ std::vector<Share> Engine::to_patches(const std::vector<Share>& slots) const {
   return patches;
 }
 
-void Engine::assemble_transfer(const Known& known, SparseRows& patch_sky) {
+// Returns what patches see of the sky, with panels as they were sampled.
+SparseRows Engine::assemble_transfer(const Known& known) {
+  SparseRows patch_sky;
   const std::size_t n = patch_rows_.size();
   patch_area_.resize(n);
   patch_reflectance_.resize(n);
@@ -233,6 +234,7 @@ void Engine::assemble_transfer(const Known& known, SparseRows& patch_sky) {
   interreflection_ =
       std::make_unique<Interreflection>(*form_factors_, through_, patch_reflectance_, patch_area_, places);
   facts_.cluster_count = interreflection_->cluster_count();
+  return patch_sky;
 }
 
 // What patches send when an even sky is all there is, and when lamps are: light that has the shape of the light of many

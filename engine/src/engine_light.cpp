@@ -151,8 +151,12 @@ void Engine::gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& f
     for (std::size_t p = 0; p < radiosity.size(); ++p) colours[p] = glm::vec4(radiosity[p], 0);
     gather(colours);
   }
-  // What is seen close by is not as even as its patch: the nodes on it, as they are now, speak for it. Those that see
-  // little else come to agree first.
+  gather_close_by(lighting);
+}
+
+// Adds to the indirect light of nodes, found from patches, what they lack of light close by. What is seen there is not
+// as even as its patch: the nodes on it, as they are now, speak for it. Those that see little else come to agree first.
+void Engine::gather_close_by(Lighting& lighting) const {
   const std::vector<glm::vec3> from_patches = lighting.node_indirect;
   std::vector<glm::vec4> sent = sent_by_nodes_and_patches(lighting);
   const auto add_near = [&](std::size_t i) {
@@ -163,7 +167,7 @@ void Engine::gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& f
     parallel_indices(nodes.size(), 64,
                      [&](std::size_t k) { sent[nodes[k]] = glm::vec4(sent_by_node(lighting, nodes[k]), 0); });
   }
-  parallel_indices(first_reflection.size(), 64, add_near);
+  parallel_indices(from_patches.size(), 64, add_near);
 }
 
 std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Lighting* previous,

@@ -198,7 +198,6 @@ void Engine::resolve_near_light(const NodeTrial& trial) {
   std::vector<std::vector<Share>> rows(nodes_->nodes().size());
   parallel_indices(rows.size(), kGrain, [&](std::size_t i) { rows[i] = resolved_by_nodes(trial.rows[i].near); });
   node_near_ = ExactRows(SparseRows::of(rows));
-  find_rounds(trial);
 }
 
 // Which nodes have to gather what is close by more than once: those that see little else, as under a slab. There light
@@ -320,6 +319,7 @@ void Engine::gather_nodes(Known& known) {
     first_part = last_part;
   }
   resolve_near_light(trial);
+  find_rounds(trial);
   keep_node_rows(trial, known);
 }
 

@@ -103,7 +103,7 @@ void Engine::set_product(int opening, Product product) {
     interreflection_->set_reflectance(p, patch_reflectance_[p]);
     if (shooting_) shooting_->set_reflectance(p, patch_reflectance_[p]);
   }
-  interreflection_->foretell();
+  if (!shooting_) interreflection_->foretell();
   if (nodes_ && !scene_.point_sources.empty()) light_always();
 }
 
@@ -114,11 +114,15 @@ void Engine::find_shafts(Condition& condition, std::vector<glm::vec3>& residual)
   const std::vector<Panel>& panels = panels_->all();
   // Of the panels of an opening group, by panel; others have none.
   using Pieces = std::vector<std::vector<SunlitPiece>>;
-  std::map<std::tuple<int, float, float, float>, Pieces> pieces_of;  // by opening group and sun
-  const auto pieces_at = [&](int opening, glm::vec3 sun) -> const Pieces& {
-    const auto [entry, is_new] = pieces_of.try_emplace({opening, sun.x, sun.y, sun.z}, panels.size());
+  using Sun = std::tuple<float, float, float>;
+  std::map<Sun, SunlitFaces> sunlit_from;
+  std::map<std::pair<int, Sun>, Pieces> pieces_of;  // by opening group and sun
+  const auto pieces_at = [&](int opening, glm::vec3 direction) -> const Pieces& {
+    const Sun sun(direction.x, direction.y, direction.z);
+    const auto [entry, is_new] = pieces_of.try_emplace({opening, sun}, panels.size());
     if (!is_new) return entry->second;
-    const SunlitFaces sunlit(faces_, scene_.materials, scene_.openings, glm::dvec3(sun));
+    const SunlitFaces& sunlit =
+        sunlit_from.try_emplace(sun, faces_, scene_.materials, scene_.openings, glm::dvec3(direction)).first->second;
     parallel_indices(panels.size(), 1, [&, &pieces = entry->second](std::size_t k) {
       if (panels[k].opening == opening) pieces[k] = sunlit.pieces(panels[k].face);
     });

@@ -52,7 +52,8 @@ Interreflection::Interreflection(const SparseRows& form_factors, const SparseRow
       sent_through_(transposed(through)),
       reflectance_(std::move(reflectance)),
       areas_(std::move(areas)),
-      groups_(places, areas_) {
+      groups_(places, areas_),
+      foretold_reflectance_(reflectance_.size(), glm::vec3(0)) {
   find_clusters(places);
   find_operators();
   const SparseRows exchange = rows_of([&](std::size_t i) { return exchange_row(i); });
@@ -144,13 +145,17 @@ void Interreflection::prepare(std::span<const std::vector<float>> smooth_lights)
     return groups_.grouped(exchange_row(i), lights, received, kLikeness);
   }));
   for (inner_cycles_ = kLeastInnerCycles;; ++inner_cycles_) {
+    is_foretold_ = false;
     foretell();
     if (foretold_shrinking_ <= kSafety * kWantedShrinking || inner_cycles_ == kMostInnerCycles) break;
   }
 }
 
 void Interreflection::foretell() {
+  if (is_foretold_) return;
   foretold_shrinking_ = std::min(1., kSafety * measured_shrinking());
+  foretold_reflectance_ = reflectance_;
+  is_foretold_ = true;
 }
 
 // How much less is left over after a second cycle than after a first, of light on patches here and there.

@@ -85,6 +85,32 @@ TEST(Interreflection, ReflectanceActsBeforeTheOperatorAndNotAfter) {
   EXPECT_NEAR(e[0].x, 0.8 * b1, 1e-3);
 }
 
+TEST(Interreflection, BrighterPatchesAreForetoldAnew) {
+  Chain dark(600), bright(600);
+  dark.reflectance.assign(600, glm::vec3(0.1f));
+  bright.reflectance.assign(600, glm::vec3(0.95f));
+  constexpr double kTolerance = 1e-3;  // of all flux
+  const auto flux = [](const std::vector<glm::vec3>& irradiance) {
+    double sum = 0;
+    for (const glm::vec3& e : irradiance) sum += static_cast<double>(e.x + e.y + e.z);
+    return sum;
+  };
+  std::vector<glm::vec3> expected;
+  Interreflection(bright.form_factors, bright.through, bright.reflectance, bright.areas, bright.places)
+      .solve({bright.emitted, bright.direct}, 1e-7, 1000, expected);
+  const auto error = [&](bool is_foretold) {
+    Interreflection changed(dark.form_factors, dark.through, dark.reflectance, dark.areas, dark.places);
+    changed.foretell();
+    for (std::size_t patch = 0; patch < 600; ++patch) changed.set_reflectance(patch, bright.reflectance[patch]);
+    if (is_foretold) changed.foretell();
+    std::vector<glm::vec3> found;
+    changed.solve({bright.emitted, bright.direct}, kTolerance, 1000, found);
+    return std::abs(flux(found) / flux(expected) - 1);
+  };
+  EXPECT_GT(error(false), 0.3);  // it stops after one cycle
+  EXPECT_LT(error(true), 0.03);
+}
+
 TEST(Interreflection, ARoomThatLosesNothingIsRefused) {
   SparseRows f, none;
   f.append({{1, 1.f}});

@@ -194,7 +194,7 @@ class Engine {
   std::vector<int> first_slots() const;
   void mark_interior();
   void check_closed();
-  void assemble_transfer(const Known& known, SparseRows& patch_sky);
+  SparseRows assemble_transfer(const Known& known);
   void find_smooth_lights();
   struct TrialLight;
   struct NodeTrial;
@@ -228,6 +228,7 @@ class Engine {
   std::vector<glm::vec4> sent_by_nodes_and_patches(const Lighting& lighting) const;
   std::vector<Share> resolved_by_nodes(const std::vector<Share>& elements) const;
   void gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& first_reflection) const;
+  void gather_close_by(Lighting& lighting) const;
   std::vector<Share> to_patches(const std::vector<Share>& slots) const;
   SkyRadiance sky_radiance(const Lighting& lighting) const;
   int ground_bin() const { return sky_index_->count() - 1; }

@@ -50,10 +50,13 @@ class Interreflection {
 
   /// Replaces the reflectance of one patch. What clusters carry stays as it was prepared: it costs cycles, not
   /// accuracy, once that has been foretold.
-  void set_reflectance(std::size_t patch, glm::vec3 reflectance) { reflectance_[patch] = reflectance; }
+  void set_reflectance(std::size_t patch, glm::vec3 reflectance) {
+    reflectance_[patch] = reflectance;
+    is_foretold_ &= glm::all(glm::lessThanEqual(reflectance, foretold_reflectance_[patch]));
+  }
 
-  /// Measures how fast light converges, by which `solve` knows when to stop. To be called when reflectances have been
-  /// replaced.
+  /// Measures how fast light converges, by which `solve` knows when to stop, unless that is known of reflectances that
+  /// are nowhere less than these. To be called when they have been replaced.
   void foretell();
 
   int cluster_count() const { return cluster_count_; }
@@ -94,6 +97,8 @@ class Interreflection {
   CompactRows likeness_;           // of it, over patches and groups
   int inner_cycles_ = 3;           // with the likeness, in each cycle
   double foretold_shrinking_ = 1;  // of what is left over, by a cycle after the first
+  bool is_foretold_ = false;       // with these reflectances, or larger ones:
+  std::vector<glm::vec3> foretold_reflectance_;
   int cluster_count_ = 0;
   std::vector<int> cluster_of_;
   std::vector<float> cluster_area_;
