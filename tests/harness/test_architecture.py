@@ -176,6 +176,21 @@ def test_engine_includes_no_file_format_no_calendar_and_no_python() -> None:
     assert found == []
 
 
+def test_headers_are_listed_in_an_order_in_which_they_can_be_read() -> None:
+    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    table = text.partition("| header | idea |")[2].partition("\n\n")[0]
+    row_of = {
+        name: row
+        for row, line in enumerate(table.splitlines())
+        for name in re.findall(r"`(\w+\.h)`", line.partition(" | ")[0])
+    }
+    headers = {file.name: file for file in (ENGINE / "include" / "transom").glob("*.h")}
+    assert sorted(row_of) == sorted(headers)
+    for name, file in headers.items():
+        for needed in re.findall(r'#include "transom/(\w+\.h)"', file.read_text(encoding="utf-8")):
+            assert row_of[needed] <= row_of[name], f"{name} needs {needed}, which comes after it"
+
+
 def test_only_judge_decides() -> None:
     """Elsewhere a verdict may be compared with, be the key of a table, or say why there is nothing to judge."""
     found = []
