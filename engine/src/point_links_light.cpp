@@ -10,7 +10,7 @@ namespace transom {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
-constexpr std::size_t kBlocksAtOnce = 8;
+constexpr std::size_t kBlocksAtOnce = 20;
 constexpr float kEven = 1e-3f;             // relative difference of elements that count as evenly lit
 constexpr float kSameHue = 1e-6f;          // of the strongest channel
 constexpr std::size_t kHuesCompared = 16;  // the last ones: patches of one face follow each other
