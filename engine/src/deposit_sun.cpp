@@ -62,10 +62,12 @@ std::vector<DirectLight::SunlitSlot> DirectLight::reached(const Sun& sun, const 
     const Face& face = mesh_.faces().faces[f];
     if (f != known_face) sun.outlines.covering(sun.outlines.outline(face.corners()), over_face);
     known_face = f;
-    const BeamOutline outline = sun.outlines.outline(receivers.corners[i]);
     over_slot.clear();
-    for (const int k : over_face)
-      if (sun.outlines.covers(k, outline)) over_slot.push_back(k);
+    if (!over_face.empty()) {
+      const BeamOutline outline = sun.outlines.outline(receivers.corners[i]);
+      std::copy_if(over_face.begin(), over_face.end(), std::back_inserter(over_slot),
+                   [&](int k) { return sun.outlines.covers(k, outline); });
+    }
     const bool is_behind = receivers.is_behind_openings[i] != 0;
     if (is_behind && std::none_of(over_slot.begin(), over_slot.end(), [&](int k) { return sun.lets_in[k] != 0; }))
       continue;

@@ -137,7 +137,8 @@ void Engine::gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& f
   find_smooth_radiosity(lighting);
   lighting.node_indirect.resize(first_reflection.size());
   const std::vector<glm::vec3>& radiosity = lighting.patch_smooth_radiosity;
-  const auto gather = [&](const auto& sent_by_patches) {
+  const auto gather = [&](auto& sent_by_patches) {
+    interreflection_->groups().append_means(sent_by_patches);
     parallel_indices(first_reflection.size(), 64, [&](std::size_t i) {
       lighting.node_indirect[i] = first_reflection[i] + glm::vec3(node_patches_.dot(i, sent_by_patches));
     });

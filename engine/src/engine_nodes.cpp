@@ -31,6 +31,8 @@ constexpr float kSloping = 2;  // from which on the middle is to be right to thi
 constexpr float kSlopingShare = 0.35f;
 constexpr float kNear = 0.25f;  // length of a part against the distance of what it sees
 
+constexpr float kLikeness = 3e-4f;  // of what a node receives from patches: what a group of these may err by
+
 constexpr int kMostRounds = 10;      // of gathering what is close by, before the one that all nodes take part in
 constexpr float kAgreement = 0.03f;  // of the light of a node, with which it leaves them
 
@@ -323,13 +325,39 @@ void Engine::gather_nodes(Known& known) {
   keep_node_rows(trial, known);
 }
 
+// What nodes see of patches, over patches and groups of them. Small errors of many groups add up: each row is scaled to
+// receive what it did of the first of the typical lights.
+SparseRows Engine::grouped_rows(const std::vector<std::vector<Share>>& rows) const {
+  if (smooth_lights_.empty()) return SparseRows::of(rows);
+  const PatchGroups& groups = interreflection_->groups();
+  std::vector<PatchGroups::TypicalLight> lights;
+  for (const std::vector<float>& light : smooth_lights_) lights.push_back(groups.typical(light));
+  std::vector<float> first = smooth_lights_.front();
+  groups.append_means(first);
+  const auto received = [](const std::vector<Share>& row, const std::vector<float>& radiosity) {
+    float sum = 0;
+    for (const Share& share : row) sum += share.weight * radiosity[static_cast<std::size_t>(share.index)];
+    return sum;
+  };
+  std::vector<std::vector<Share>> grouped(rows.size());
+  parallel_indices(rows.size(), 64, [&](std::size_t i) {
+    std::vector<float> all;
+    for (const std::vector<float>& light : smooth_lights_) all.push_back(received(rows[i], light));
+    grouped[i] = groups.grouped(rows[i], lights, all, kLikeness);
+    const float sum = received(grouped[i], first);
+    if (sum > 0)
+      for (Share& share : grouped[i]) share.weight *= all.front() / sum;
+  });
+  return SparseRows::of(grouped);
+}
+
 // Moves what the nodes have seen to where relighting and later edits look for it.
 void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
   facts_.node_count = static_cast<int>(trial.rows.size());
   facts_.kept_node_rows =
       static_cast<int>(std::count_if(known.node.begin(), known.node.end(), [](int node) { return node >= 0; }));
   known.has_same_nodes = known.has_same_faces() && nodes_->nodes() == known.engine->nodes_->nodes();
-  node_patches_ = CompactRows(SparseRows::of(trial.patches));
+  node_patches_ = CompactRows(grouped_rows(trial.patches));
   trial.patches.clear();
   node_sky_ = SkyRows(SparseRows::of(trial.rows, &GatherRow::sky), ground_bin());
   const auto found = std::make_shared<NodeRows>();

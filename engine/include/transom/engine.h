@@ -202,6 +202,7 @@ class Engine {
   GatherRow surroundings_of_node(const Node& node, int known_node, const Known& known) const;
   void look_through_openings(const Node& node, int known_node, const Known& known, GatherRow& row) const;
   void gather_new_nodes(NodeTrial& trial, int first_part, Known& known);
+  SparseRows grouped_rows(const std::vector<std::vector<Share>>& rows) const;
   void keep_node_rows(NodeTrial& trial, Known& known);
   void resolve_near_light(const NodeTrial& trial);
   void find_rounds(const NodeTrial& trial);
@@ -286,7 +287,7 @@ class Engine {
   std::unique_ptr<NodeField> nodes_;
   std::shared_ptr<const NodeRows> node_rows_;
   SkyRows node_sky_;                          // all of the sky
-  CompactRows node_patches_;                  // all that nodes see of patches
+  CompactRows node_patches_;                  // all that nodes see of patches, far ones in groups
   std::vector<NodeShares> nodes_at_element_;  // what speaks for each element of patches, at its middle
   ExactRows node_near_;  // what the nodes, then the patches, send close by: those with their weights, less these
   std::vector<std::vector<std::size_t>> nodes_of_round_;  // that gather what is close by before all do, and again

@@ -60,6 +60,7 @@ class Interreflection {
   void foretell();
 
   int cluster_count() const { return cluster_count_; }
+  const PatchGroups& groups() const { return groups_; }
 
  private:
   void find_clusters(const std::vector<PatchPlace>& places);
