@@ -325,29 +325,14 @@ void Engine::gather_nodes(Known& known) {
   keep_node_rows(trial, known);
 }
 
-// What nodes see of patches, over patches and groups of them. Small errors of many groups add up: each row is scaled to
-// receive what it did of the first of the typical lights.
+// What nodes see of patches, over patches and groups of them.
 SparseRows Engine::grouped_rows(const std::vector<std::vector<Share>>& rows) const {
-  if (smooth_lights_.empty()) return SparseRows::of(rows);
   const PatchGroups& groups = interreflection_->groups();
   std::vector<PatchGroups::TypicalLight> lights;
   for (const std::vector<float>& light : smooth_lights_) lights.push_back(groups.typical(light));
-  std::vector<float> first = smooth_lights_.front();
-  groups.append_means(first);
-  const auto received = [](const std::vector<Share>& row, const std::vector<float>& radiosity) {
-    float sum = 0;
-    for (const Share& share : row) sum += share.weight * radiosity[static_cast<std::size_t>(share.index)];
-    return sum;
-  };
   std::vector<std::vector<Share>> grouped(rows.size());
-  parallel_indices(rows.size(), 64, [&](std::size_t i) {
-    std::vector<float> all;
-    for (const std::vector<float>& light : smooth_lights_) all.push_back(received(rows[i], light));
-    grouped[i] = groups.grouped(rows[i], lights, all, kLikeness);
-    const float sum = received(grouped[i], first);
-    if (sum > 0)
-      for (Share& share : grouped[i]) share.weight *= all.front() / sum;
-  });
+  parallel_indices(rows.size(), 64,
+                   [&](std::size_t i) { grouped[i] = groups.grouped(rows[i], lights, kLikeness); });
   return SparseRows::of(grouped);
 }
 

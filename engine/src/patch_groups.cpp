@@ -69,12 +69,11 @@ int PatchGroups::add_group(const std::vector<PatchPlace>& places, const std::vec
 
 PatchGroups::TypicalLight PatchGroups::typical(std::vector<float> radiosity) const {
   TypicalLight light{std::move(radiosity), std::vector<float>(groups_.size(), 0.f)};
-  std::vector<float> means = light.radiosity;
-  append_means(means);
+  append_means(light.radiosity);
   for (int g = 0; g < group_count(); ++g) {
     float sum = 0;
     for (int k = groups_[g].first; k < groups_[g].first + groups_[g].count; ++k) {
-      const float difference = light.radiosity[order_[k]] - means[patch_count() + g];
+      const float difference = light.radiosity[order_[k]] - light.radiosity[patch_count() + g];
       sum += difference * difference;
     }
     light.deviation[g] = std::sqrt(sum / static_cast<float>(groups_[g].count));
@@ -82,8 +81,27 @@ PatchGroups::TypicalLight PatchGroups::typical(std::vector<float> radiosity) con
   return light;
 }
 
+float PatchGroups::TypicalLight::received_by(const std::vector<Share>& row) const {
+  float sum = 0;
+  for (const Share& share : row) sum += share.weight * radiosity[share.index];
+  return sum;
+}
+
 std::vector<Share> PatchGroups::grouped(const std::vector<Share>& row, const std::vector<TypicalLight>& lights,
-                                        const std::vector<float>& scales, float tolerance) const {
+                                        float tolerance) const {
+  if (lights.empty()) return row;
+  std::vector<float> received;
+  for (const TypicalLight& light : lights) received.push_back(light.received_by(row));
+  std::vector<Share> result = grouped_within(row, lights, received, tolerance);
+  const float sum = lights.front().received_by(result);
+  if (sum > 0)
+    for (Share& share : result) share.weight *= received.front() / sum;
+  return result;
+}
+
+// Groups where, under each of the lights, weight times deviation is at most `tolerance` times what the row receives.
+std::vector<Share> PatchGroups::grouped_within(const std::vector<Share>& row, const std::vector<TypicalLight>& lights,
+                                               const std::vector<float>& received, float tolerance) const {
   thread_local std::vector<float> weight;  // by group; 0 between calls
   thread_local std::vector<int> touched;
   weight.resize(std::max(weight.size(), groups_.size()), 0.f);
@@ -95,7 +113,7 @@ std::vector<Share> PatchGroups::grouped(const std::vector<Share>& row, const std
     }
   const auto is_fine = [&](int g) {
     for (std::size_t k = 0; k < lights.size(); ++k)
-      if (weight[g] * lights[k].deviation[g] > tolerance * scales[k]) return false;
+      if (weight[g] * lights[k].deviation[g] > tolerance * received[k]) return false;
     return true;
   };
   std::vector<Share> result;

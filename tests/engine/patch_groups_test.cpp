@@ -49,35 +49,37 @@ TEST(PatchGroups, MeansAreByAreaAndOfOneMaterial) {
   EXPECT_GT(floors.groups.group_count(), 700);
 }
 
-TEST(PatchGroups, AGroupedRowKeepsItsSumAndIsAsGoodAsAsked) {
+TEST(PatchGroups, AGroupedRowReceivesAsMuchOfTheFirstLightAndAsGoodAsAskedOfOthers) {
   const Floors floors;
   const std::vector<Share> row = floors.even_row();
-  std::vector<float> light = floors.sloping();
-  float received = 0;
-  for (const Share& share : row) received += share.weight * light[share.index];
-  const auto typical = floors.groups.typical(light);
-  std::vector<float> extended = light;
-  floors.groups.append_means(extended);
+  std::vector<float> steeper;
+  for (const float radiosity : floors.sloping()) steeper.push_back(radiosity * radiosity);
+  const std::vector<PatchGroups::TypicalLight> lights{floors.groups.typical(floors.sloping()),
+                                                      floors.groups.typical(steeper)};
   std::size_t before = row.size() + 1;
   for (const float tolerance : {0.f, 1e-4f, 1e-3f, 1e-2f}) {
-    const std::vector<Share> grouped = floors.groups.grouped(row, {typical}, {received}, tolerance);
-    float sum = 0, found = 0;
-    for (const Share& share : grouped) {
-      sum += share.weight;
-      found += share.weight * extended[share.index];
-    }
-    EXPECT_NEAR(sum, 1, 1e-5f);
-    EXPECT_NEAR(found / received, 1, tolerance * static_cast<float>(grouped.size()) + 1e-5f);
+    const std::vector<Share> grouped = floors.groups.grouped(row, lights, tolerance);
+    float sum = 0;
+    for (const Share& share : grouped) sum += share.weight;
+    EXPECT_NEAR(lights[0].received_by(grouped) / lights[0].received_by(row), 1, 1e-5f);
+    const float bound = tolerance * static_cast<float>(grouped.size()) + 1e-5f;
+    EXPECT_NEAR(lights[1].received_by(grouped) / lights[1].received_by(row), 1, bound);
+    EXPECT_NEAR(sum, 1, bound);
     EXPECT_LT(grouped.size(), before);
     before = grouped.size();
   }
   EXPECT_LT(before, 60u);  // the ceiling is even: it is a few groups whatever the tolerance
 }
 
+TEST(PatchGroups, WithoutATypicalLightARowStaysAsItIs) {
+  const Floors floors;
+  EXPECT_EQ(floors.groups.grouped(floors.even_row(), {}, 1), floors.even_row());
+}
+
 TEST(PatchGroups, WithoutPatchesThereAreNoGroups) {
   const PatchGroups none({}, {});
   EXPECT_EQ(none.group_count(), 0);
-  EXPECT_TRUE(none.grouped({}, {}, {}, 1).empty());
+  EXPECT_TRUE(none.grouped({}, {}, 1).empty());
 }
 
 }  // namespace

@@ -38,16 +38,18 @@ class PatchGroups {
 
   /// A light whose shape is that of the light of many conditions.
   struct TypicalLight {
-    std::vector<float> radiosity;  ///< of patches
+    std::vector<float> radiosity;  ///< of patches, then of groups
     std::vector<float> deviation;  ///< by group: what its patches differ from their mean by, root mean square
+
+    float received_by(const std::vector<Share>& row) const;
   };
   TypicalLight typical(std::vector<float> radiosity) const;
 
   /// A row over patches and groups. A group takes the place of its patches where, under each of the lights, its weight
-  /// times its deviation is at most `tolerance` times `scales`, by light; the sum of weights stays. Threads may ask at
-  /// once.
+  /// times its deviation is at most `tolerance` times what the row receives. Small errors of many groups add up, so the
+  /// row is scaled to receive what it did of the first light. Without lights: the row. Threads may ask at once.
   std::vector<Share> grouped(const std::vector<Share>& row, const std::vector<TypicalLight>& lights,
-                             const std::vector<float>& scales, float tolerance) const;
+                             float tolerance) const;
 
  private:
   struct Group {
@@ -58,6 +60,8 @@ class PatchGroups {
   };
   int add_group(const std::vector<PatchPlace>& places, const std::vector<float>& areas, int first, int count,
                 int parent);
+  std::vector<Share> grouped_within(const std::vector<Share>& row, const std::vector<TypicalLight>& lights,
+                                    const std::vector<float>& received, float tolerance) const;
 
   std::vector<int> order_;            // patches; those of a group stand together
   std::vector<int> parent_of_patch_;  // -1: none
