@@ -5,6 +5,7 @@
 
 #include "arrays.h"
 #include "transom/sky.h"
+#include "transom/sky_formula.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -19,6 +20,32 @@ void bind_condition(nb::module_& m) {
                                   static_cast<int>(luminance.shape(0))};
           },
           "luminance"_a);
+
+  nb::class_<SkyBinMeans>(m, "SkyBinMeans", "Luminance of skies that have a formula, averaged over bins.")
+      .def(
+          "__init__",
+          [](SkyBinMeans* self, In<float, nb::shape<-1, 3>> middles, int horizon_count, float steep_cosine,
+             In<float, nb::ndim<2>> smooth_weights, In<float, nb::shape<-1, -1, 3>> smooth_directions,
+             In<float, nb::ndim<2>> steep_weights, In<float, nb::shape<-1, -1, 3>> steep_directions) {
+            new (self) SkyBinMeans(
+                to_vector<glm::vec3>(middles), horizon_count, steep_cosine,
+                SkyNodes(to_vector<glm::vec3>(smooth_directions), to_vector<float>(smooth_weights)),
+                SkyNodes(to_vector<glm::vec3>(steep_directions), to_vector<float>(steep_weights)));
+          },
+          "middles"_a, "horizon_count"_a, "steep_cosine"_a, "smooth_weights"_a, "smooth_directions"_a,
+          "steep_weights"_a, "steep_directions"_a)
+      .def(
+          "of",
+          [](const SkyBinMeans& means, std::tuple<float, float, float, float, float, float> formula,
+             std::tuple<float, float, float> direction_to_sun) {
+            const auto [a, b, c, d, e, k] = formula;
+            std::vector<float> luminance = means.of({a, b, c, d, e, k, vector_of(direction_to_sun)});
+            const std::size_t count = luminance.size();
+            return to_array<float>(std::move(luminance), {count});
+          },
+          "formula"_a, "direction_to_sun"_a,
+          "Of (1 + a exp(b / sin h)) (k + c exp(d x) + e cos² x), at least 0, at altitude h and angle x from the sun;\n"
+          "formula: a, b, c, d, e, k [cd/m²].");
 
   nb::class_<Condition>(m, "Condition")
       .def(

@@ -16,7 +16,13 @@ from transom.daylight.condition import Condition
 from transom.daylight.environment import dome_image
 from transom.daylight.sky_bins import SkyBins
 from transom.daylight.sun_disc import Sun, SunPlan, plan_sun
-from transom.engine_scene import engine_condition, engine_geometry, fenestration_of, what_else_changed
+from transom.engine_scene import (
+    EngineSky,
+    engine_condition,
+    engine_geometry,
+    fenestration_of,
+    what_else_changed,
+)
 from transom.errors import InputError
 from transom.fenestration.light import panel_light
 from transom.fenestration.panels import panel_groups
@@ -100,7 +106,7 @@ class Engine:
 
     scene: Scene
     options: SolveOptions
-    sky_bins: SkyBins
+    sky: EngineSky = field(repr=False)
     _core: _engine.Engine = field(repr=False)
     condition: Condition | None = None
     present_sun: SunPlan = field(default_factory=SunPlan)
@@ -115,7 +121,7 @@ class Engine:
             core = _engine.Engine(engine_geometry(scene), _core_bins(sky_bins), _core_options(options, trace))
         except _engine.EngineInputError as error:
             raise InputError(_with_object_names(str(error), scene), file=scene.file) from None
-        engine = cls(scene, options, sky_bins, core)
+        engine = cls(scene, options, EngineSky(sky_bins), core)
         engine._set_products()
         return engine
 
@@ -131,7 +137,7 @@ class Engine:
             core = _engine.Engine(self._core, engine_geometry(scene))
         except _engine.EngineInputError as error:
             raise InputError(_with_object_names(str(error), scene), file=scene.file) from None
-        engine = type(self)(scene, self.options, self.sky_bins, core)
+        engine = type(self)(scene, self.options, self.sky, core)
         engine._set_products()
         return engine
 
@@ -209,7 +215,7 @@ class Engine:
 
     def _core_condition(self, condition: Condition, sun: Sun) -> tuple[_engine.Condition, SunPlan]:
         plan = self.sun_plan(condition) if sun == "auto" else SunPlan(1 if condition.sun_direction is None else sun)
-        return engine_condition(self.scene, condition, self.sky_bins, plan.sub_suns), plan
+        return engine_condition(self.scene, condition, self.sky, plan.sub_suns), plan
 
     def render(
         self, view: View, visibility: Visibility = "rays", *, edge_samples: int = 4, components: bool = True

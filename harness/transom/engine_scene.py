@@ -53,11 +53,36 @@ def engine_geometry(scene: Scene) -> _engine.SceneGeometry:
     return geometry
 
 
-def engine_condition(scene: Scene, condition: Condition, sky_bins: SkyBins, sub_sun_count: int) -> _engine.Condition:
+class EngineSky:
+    """The sky's bins as an engine has them, and their luminance."""
+
+    def __init__(self, bins: SkyBins) -> None:
+        self.bins = bins
+        single = [np.ascontiguousarray(array, dtype=np.float32) for array in (bins.directions, *bins.smooth, *bins.steep)]
+        middles, smooth_directions, smooth_weights, steep_directions, steep_weights = single
+        self._means = _engine.SkyBinMeans(
+            middles,
+            int(bins.row_counts[0]),
+            bins.steep_cosine,
+            smooth_weights,
+            smooth_directions,
+            steep_weights,
+            steep_directions,
+        )
+
+    def luminance(self, condition: Condition) -> NDArray[np.float32]:
+        """Mean over each bin (bins.count,) [cd/m²]: `Condition.bin_luminance` in single precision, within 1e-5."""
+        formula = condition.sky.formula()
+        if formula is None:
+            return condition.bin_luminance(self.bins).astype(np.float32)
+        return self._means.of(formula, condition.sky.sun_direction)
+
+
+def engine_condition(scene: Scene, condition: Condition, sky: EngineSky, sub_sun_count: int) -> _engine.Condition:
     """Sky, ground and beams. Products receive a point sun whatever sub-suns stand for it elsewhere: their lobes are
     wider than its disc, or are made parallel on purpose."""
     core_condition = _engine.Condition(
-        condition.bin_luminance(sky_bins, single=True).astype(np.float32, copy=False),
+        sky.luminance(condition),
         _triple(condition.sky_rgb),
         _triple(condition.ground_luminance_rgb),
     )

@@ -9,6 +9,7 @@ import pytest
 
 from transom.daylight import SkyBins, resolve_condition
 from transom.daylight.sky_model import Floats
+from transom.engine_scene import EngineSky
 from transom.scene.model import ConditionSpec, Site
 
 SITE = Site("London", math.radians(51.5), math.radians(-0.12), 0.0)
@@ -126,11 +127,13 @@ def test_bin_means_converge_to_one_sky_whatever_the_bins() -> None:
     assert gathered == pytest.approx(flux, rel=3e-4)
 
 
-@pytest.mark.parametrize("sky", ["cie:1", "cie:12", "cie:15", "cie:16", "perez:700,90", "none"])
-def test_single_precision_gives_the_same_bins(sky: str) -> None:
-    condition = resolve_condition(ConditionSpec("a", "2026-03-21T10:00", sky), SITE)
+@pytest.mark.parametrize("sky", [*(f"cie:{number}" for number in range(1, 17)), "perez:700,90", "perez:30,200", "none"])
+@pytest.mark.parametrize("time", ["2026-03-21T07:30", "2026-06-21T12:00"])
+def test_the_engines_bins_are_those_of_double_precision(sky: str, time: str) -> None:
+    """Its formula is written anew, in single precision: a low sun and a high one, steep bins and others."""
+    condition = resolve_condition(ConditionSpec("a", time, sky), SITE)
     bins = SkyBins(4)
-    fast = condition.bin_luminance(bins, single=True)
+    fast = EngineSky(bins).luminance(condition)
     assert fast.dtype == np.float32
     assert fast == pytest.approx(condition.bin_luminance(bins), rel=1e-5)
 

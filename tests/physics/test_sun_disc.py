@@ -92,7 +92,7 @@ def test_one_sub_sun_is_the_point_bit_by_bit() -> None:
     first = room.engine.render(from_window()).radiance
     room.engine.relight(room.condition, 19)
     disc = room.engine.render(from_window()).radiance
-    core = engine_condition(room.scene, room.condition, room.engine.sky_bins, 1)
+    core = engine_condition(room.scene, room.condition, room.engine.sky, 1)
     sun = room.condition.sun_direction
     assert sun is not None
     core.add_sub_sun(tuple(sun.tolist()), tuple(room.condition.sun_illuminance_rgb.tolist()))
@@ -120,7 +120,7 @@ def test_indirect_light_of_a_point_is_that_of_the_disc() -> None:
     room = lit(louvre_room(30), sun=19)
     engine, condition = room.engine, room.condition
     of_point = room.measure()["indirect"]
-    core = engine_condition(engine.scene, replace(condition, sun_direction=None), engine.sky_bins, 1)
+    core = engine_condition(engine.scene, replace(condition, sun_direction=None), engine.sky, 1)
     assert condition.sun_direction is not None
     r, g, b = sub_sun_illuminance(condition.sun_illuminance_rgb, 19).tolist()
     for x, y, z in sub_suns(condition.sun_direction, 19).tolist():
@@ -188,7 +188,7 @@ def test_a_wrong_number_of_sub_suns_is_refused_and_keeps_the_light() -> None:
 
 def test_a_sub_sun_that_is_no_light_is_refused() -> None:
     room = lit(windowed_room())
-    core = engine_condition(room.scene, room.condition, room.engine.sky_bins, 7)
+    core = engine_condition(room.scene, room.condition, room.engine.sky, 7)
     core.add_sub_sun((0.0, 0.0, 2.0), (1.0, 1.0, 1.0))
     with pytest.raises(_engine.EngineInputError, match="unit"):
         room.engine._core.relight(core)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transom.daylight.sky_choice import TRADITIONAL_OVERCAST
-from transom.daylight.sky_model import Floats
+from transom.daylight.sky_model import Floats, Formula
 
 Float64 = NDArray[np.float64]
 
@@ -64,3 +64,10 @@ class CieSky:
             1 + c * (np.exp(d * np.arccos(cosine)) - math.exp(d * math.pi / 2)) + e * cosine**2
         )
         return result
+
+    def formula(self) -> Formula | None:
+        """a, b, c, d, e of the standard, and k = 1 - c exp(d pi/2); None: the traditional overcast sky has another."""
+        if self.type == TRADITIONAL_OVERCAST:
+            return None
+        a, b, c, d, e = STANDARD_PARAMETERS[self.type]
+        return a, b, c, d, e, 1 - c * math.exp(d * math.pi / 2)

@@ -72,12 +72,9 @@ class Condition:
         }
         return hashlib.sha256(json.dumps(_rounded(content), sort_keys=True).encode()).hexdigest()
 
-    def bin_luminance(self, bins: SkyBins, *, single: bool = False) -> Floats:
-        """Mean luminance of the sky over each bin's solid angle (bins.count,) [cd/m²]; the sun's disc is not in it.
-
-        single: calculated in single precision, within 1e-5 and several times as fast.
-        """
-        return bins.mean(self.sky.luminance, np.array(self.sky.sun_direction), single=single)
+    def bin_luminance(self, bins: SkyBins) -> Floats:
+        """Mean luminance of the sky over each bin's solid angle (bins.count,) [cd/m²]; the sun's disc is not in it."""
+        return bins.mean(self.sky.luminance, np.array(self.sky.sun_direction))
 
     def environment_image(self, height: int) -> Float32:
         """Sky and ground as a latitude-longitude image (height, 2 height, 3) [cd/m²], without the sun.

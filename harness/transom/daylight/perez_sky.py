@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transom.daylight.cie_sky import SMALLEST_SINE
-from transom.daylight.sky_model import Floats
+from transom.daylight.sky_model import Floats, Formula
 from transom.errors import InputError
 
 Float64 = NDArray[np.float64]
@@ -89,6 +89,10 @@ class PerezSky:
         indicatrix = 1 + c * np.exp(d * np.arccos(cosine)) + e * cosine**2
         result: Floats = np.maximum(gradation * indicatrix, 0.0)
         return result
+
+    def formula(self) -> Formula | None:
+        """Its parameters; k = 1."""
+        return *self.parameters, 1.0
 
 
 def clearness_and_brightness(

@@ -34,6 +34,8 @@ class SkyBins:
     subdivision: m. count: number of bins. row_altitude_edges (rows + 1,) [rad], 0 to pi/2, cap included.
     row_counts (rows,). row_offsets (rows,): first bin of each row. solid_angles (count,) [sr], their sum 2 pi.
     directions (count, 3): centres. mean_sin_altitude (count,): sin(altitude) averaged over the bin's solid angle.
+    smooth, steep: unit vectors (count, nodes, 3) in each bin and weights (count, nodes) for means over it, more where
+    the sky is steep: in the first row, and where a bin's centre is closer to the sun than steep_cosine says.
     """
 
     def __init__(self, subdivision: int = 1) -> None:
@@ -56,9 +58,8 @@ class SkyBins:
         turn = (np.arange(self.count) - self.row_offsets[row] + 0.5) / self.row_counts[row]
         self.directions: Float64 = _unit_vectors(altitudes[row], 2 * math.pi * turn)
         order = {1: 10, 2: 4}.get(m, 2)  # the larger the bins, the more nodes
-        smooth, steep = self._quadrature(order), self._quadrature(max(order, STEEP_ORDER))
-        self._double = smooth, steep
-        self._single = _in_single_precision(smooth), _in_single_precision(steep)
+        self.smooth, self.steep = self._quadrature(order), self._quadrature(max(order, STEEP_ORDER))
+        self.steep_cosine = math.cos(STEEP_ANGLE_RAD + self.row_altitude_edges[1])
 
     def index(self, directions: Float64) -> Int32:
         """Bin of each direction (N, 3), unit vectors -> (N,); -1 below the horizon."""
@@ -68,17 +69,16 @@ class SkyBins:
         column = np.minimum(turn * self.row_counts[row], self.row_counts[row] - 1).astype(np.int32)
         return np.where(altitude < 0, -1, self.row_offsets[row] + column).astype(np.int32)
 
-    def mean(self, luminance: Callable[[Floats], Floats], steep: Float64, *, single: bool = False) -> Floats:
+    def mean(self, luminance: Callable[[Floats], Floats], steep: Float64) -> Floats:
         """Mean over each bin's solid angle (count,) of luminance(unit vectors (N, 3)) -> (N,).
 
         steep: unit vector (3,) around which, as along the horizon, the sky changes so much within a bin that more nodes
-        are taken. single: in single precision, several times as fast.
+        are taken.
         """
-        smooth, fine = self._single if single else self._double
-        mean = _weighted(luminance, *smooth)
-        is_steep = self.directions @ steep > math.cos(STEEP_ANGLE_RAD + self.row_altitude_edges[1])
+        mean = _weighted(luminance, *self.smooth)
+        is_steep = self.directions @ steep > self.steep_cosine
         is_steep[: self.row_counts[0]] = True
-        mean[is_steep] = _weighted(luminance, fine[0][is_steep], fine[1][is_steep])
+        mean[is_steep] = _weighted(luminance, self.steep[0][is_steep], self.steep[1][is_steep])
         return mean
 
     def _quadrature(self, order: int) -> tuple[Float64, Float64]:
@@ -105,11 +105,6 @@ class SkyBins:
 def _weighted(luminance: Callable[[Floats], Floats], nodes: Floats, weights: Floats) -> Floats:
     mean: Floats = np.einsum("ij,ij->i", luminance(nodes.reshape(-1, 3)).reshape(weights.shape), weights)
     return mean
-
-
-def _in_single_precision(quadrature: tuple[Float64, Float64]) -> tuple[Floats, Floats]:
-    nodes, weights = quadrature
-    return nodes.astype(np.float32), weights.astype(np.float32)
 
 
 def _unit_vectors(altitude: Float64, azimuth: Float64) -> Float64:

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 Float64 = NDArray[np.float64]
 Floats = NDArray[np.floating[Any]]
 Vector = tuple[float, float, float]
+Formula = tuple[float, float, float, float, float, float]
+"""a, b, c, d, e, k of a luminance (1 + a exp(b / sin h)) (k + c exp(d x) + e cos² x), at least 0, at altitude h and
+angle x from the sun."""
 
 QUADRATURE_ORDER = 64  # In each of two altitude panels and in azimuth: CIE skies to better than 1e-8.
 
@@ -41,11 +44,7 @@ class SkyModel:
     scale: float
 
     def luminance(self, directions: Floats) -> Floats:
-        """Luminance [cd/m²] in unit directions (N, 3) -> (N,); 0 below the horizon.
-
-        In the precision of the directions: single is several times as fast, and errs by 1e-6 away from the sun, at its
-        centre by up to 1e-3.
-        """
+        """Luminance [cd/m²] in unit directions (N, 3) -> (N,), in their precision; 0 below the horizon."""
         if self.scale == 0:
             return np.zeros(len(directions), dtype=directions.dtype)
         is_up = directions[:, 2] >= 0
@@ -59,6 +58,14 @@ class SkyModel:
         cos_sun_angle = directions @ np.array(self.sun_direction, dtype=directions.dtype)
         relative: Floats = self.pattern.relative_luminance(directions[:, 2], cos_sun_angle)
         return self.scale * relative
+
+    def formula(self) -> Formula | None:
+        """The luminance as parameters, its level in k, c and e; None: the pattern has none."""
+        relative = self.pattern.formula()
+        if relative is None:
+            return None
+        a, b, c, d, e, k = relative
+        return a, b, self.scale * c, d, self.scale * e, self.scale * k
 
     def horizontal_illuminance(self) -> float:
         """Illuminance of the unobstructed horizontal plane by the sky alone [lx]."""
