@@ -16,7 +16,7 @@ namespace {
 constexpr int kLargestClusterCount = 320;
 constexpr std::size_t kGrain = 128;
 constexpr std::size_t kBrightParts = 4;  // of bright patches, whose light is found at the same time
-constexpr float kLikeness = 6e-4f;       // of what a patch receives: what a group may err by
+constexpr float kLikeness = 4.5e-4f;      // of what a patch receives: what a group may err by
 constexpr std::size_t kProbeStep = 37;   // patches, between those that are lit to measure how fast light converges
 constexpr double kSafety = 2;            // on what has been measured
 constexpr int kLeastInnerCycles = 2, kMostInnerCycles = 5;  // with the likeness
