@@ -180,11 +180,10 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
   if (!is_wanted()) return nullptr;
   if (follower) follower->show(with_indirect_of(*lighting, previous));
   std::vector<glm::vec3> first_reflection = node_always_;
-  {
+  const auto find_first_reflection = [&] {
     const TracePhase phase(trace_, "first reflection");
     links_->add_irradiance({lighting->bright_elements.data(), lighting->beam_bright_count}, first_reflection);
-  }
-  if (!is_wanted()) return nullptr;
+  };
   // A state on the way once most of the indirect light is there; later cycles change what an eye does not see.
   const auto after_cycle = [&](int cycle, const std::vector<glm::vec3>& irradiance) {
     if (!is_wanted()) return false;
@@ -197,7 +196,15 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
     }
     return true;
   };
-  if (!solve_with_panels(*lighting, after_cycle) || !is_wanted()) return nullptr;
+  bool is_solved = true;
+  const auto interreflect = [&] { is_solved = is_wanted() && solve_with_panels(*lighting, after_cycle); };
+  if (follower) {  // its state on the way has both
+    find_first_reflection();
+    interreflect();
+  } else {
+    parallel_pair(find_first_reflection, interreflect);
+  }
+  if (!is_solved || !is_wanted()) return nullptr;
   gather_indirect(*lighting, first_reflection);
   return lighting;
 }

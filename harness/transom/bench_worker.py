@@ -31,20 +31,26 @@ CPU_TIME = "all threads"
 
 Span = tuple[str, float, float]
 
+BESIDE = {"first reflection": "interreflection"}
+"""Phases that run beside another one: neither is a part of the other, and their times overlap."""
+
 
 def phase_seconds(spans: Iterable[Span], prefix: str) -> dict[str, float]:
     """Seconds by path of nested spans (name, begin, end), summed over repeats: "relight/gather" under prefix "relight".
 
-    A span that lies within another is its part. Within a step, the engine's "frame" is the whole: it adds no level.
+    A span that lies within another is its part, but for those BESIDE each other. Within a step, the engine's "frame" is
+    the whole: it adds no level.
     """
     totals: dict[str, float] = {}
-    open_spans: list[tuple[str, float]] = []
+    open_spans: list[tuple[str, str, float]] = []  # name, path, end
     for name, begin, end in sorted(spans, key=lambda span: (span[1], -span[2])):
-        while open_spans and begin >= open_spans[-1][1]:
+        while open_spans and begin >= open_spans[-1][2]:
             open_spans.pop()
-        above = open_spans[-1][0] if open_spans else prefix
+        around = [path for other, path, _ in open_spans if other != BESIDE.get(name)]
+        above = around[-1] if around else prefix
         path = above if name == "frame" and above else f"{above}/{name}"
-        open_spans.append((path, end))
+        if name not in BESIDE:
+            open_spans.append((name, path, end))
         if path != prefix:
             totals[path] = totals.get(path, 0.0) + end - begin
     return totals

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from transom.bench_worker import SENSOR_RAYS, Span, phase_seconds
+from transom.bench_worker import BESIDE, SENSOR_RAYS, Span, phase_seconds
 from transom.daylight.condition import Condition, resolve_condition
 from transom.errors import InputError
 from transom.files import json_text, write_atomic
@@ -20,8 +20,9 @@ from transom.scene.model import Scene, View
 
 Result = TypeVar("Result")
 
-PROCESS, THREAD = 1, 1
-"""Of the trace file: the engine's phases are sequential steps of the calling thread, which its workers share."""
+PROCESS, THREAD, BESIDE_THREAD = 1, 1, 2
+"""Of the trace file: the engine's phases are steps of the calling thread, which its workers share, but for one that runs
+beside another."""
 
 
 @dataclass(frozen=True)
@@ -108,25 +109,34 @@ def record_trace(load: Callable[[], Scene], view_name: str | None = None, condit
 
 def write_trace(path: Path, trace: Trace) -> None:
     """Writes a trace in the Trace Event Format (complete events, "ph": "X"), which Perfetto and Chrome open."""
-    titles = {"process_name": f"Transom: {trace.name}", "thread_name": "calling thread"}
-    events: list[dict[str, Any]] = [
-        {"name": kind, "ph": "M", "pid": PROCESS, "tid": THREAD, "args": {"name": title}}
-        for kind, title in titles.items()
+    titles = [
+        ("process_name", THREAD, f"Transom: {trace.name}"),
+        ("thread_name", THREAD, "calling thread"),
+        ("thread_name", BESIDE_THREAD, "beside it"),
     ]
-    events += [
+    events: list[dict[str, Any]] = [
+        {"name": kind, "ph": "M", "pid": PROCESS, "tid": thread, "args": {"name": title}}
+        for kind, thread, title in titles
+    ]
+    events += span_events(trace.spans)
+    other = {"scene": trace.name, "facts": trace.facts, "provenance": current_provenance().model_dump(mode="json")}
+    write_atomic(path, json_text({"traceEvents": events, "displayTimeUnit": "ms", "otherData": other}))
+
+
+def span_events(spans: Iterable[Span]) -> list[dict[str, Any]]:
+    """Spans [s] as complete events of the Trace Event Format."""
+    return [
         {
             "name": name,
             "cat": "transom",
             "ph": "X",
             "pid": PROCESS,
-            "tid": THREAD,
+            "tid": BESIDE_THREAD if name in BESIDE else THREAD,
             "ts": round(1e6 * begin, 3),
             "dur": round(1e6 * (end - begin), 3),
         }
-        for name, begin, end in trace.spans
+        for name, begin, end in spans
     ]
-    other = {"scene": trace.name, "facts": trace.facts, "provenance": current_provenance().model_dump(mode="json")}
-    write_atomic(path, json_text({"traceEvents": events, "displayTimeUnit": "ms", "otherData": other}))
 
 
 def read_trace(path: Path) -> Trace:

@@ -19,6 +19,7 @@ from transom.errors import InputError, StorageError
 from transom.failures import clear_failure, write_failure
 from transom.files import require_writable
 from transom.noise import mean_relative_standard_error
+from transom.phases import span_events
 from transom.pooling import finished_batches, group_means, pooled_image, pooled_sensors
 from transom.renderer import ImageResult, Progress, Renderer, SensorResult
 from transom.scene.model import Scene, View
@@ -351,8 +352,5 @@ def _without_trace(facts: Mapping[str, Any]) -> tuple[dict[str, Any], Mapping[st
     if not phases:
         return plain, None
     origin = min(begin for _, begin, _ in phases)
-    events = [
-        {"name": name, "ph": "X", "pid": 1, "tid": 1, "ts": 1e6 * (begin - origin), "dur": 1e6 * (end - begin)}
-        for name, begin, end in phases
-    ]
-    return plain, {"traceEvents": events, "displayTimeUnit": "ms"}
+    spans = [(name, begin - origin, end - origin) for name, begin, end in phases]
+    return plain, {"traceEvents": span_events(spans), "displayTimeUnit": "ms"}
