@@ -27,10 +27,9 @@ void bind_condition(nb::module_& m) {
           [](SkyBinMeans* self, In<float, nb::shape<-1, 3>> middles, int horizon_count, float steep_cosine,
              In<float, nb::ndim<2>> smooth_weights, In<float, nb::shape<-1, -1, 3>> smooth_directions,
              In<float, nb::ndim<2>> steep_weights, In<float, nb::shape<-1, -1, 3>> steep_directions) {
-            new (self) SkyBinMeans(
-                to_vector<glm::vec3>(middles), horizon_count, steep_cosine,
-                SkyNodes(to_vector<glm::vec3>(smooth_directions), to_vector<float>(smooth_weights)),
-                SkyNodes(to_vector<glm::vec3>(steep_directions), to_vector<float>(steep_weights)));
+            new (self) SkyBinMeans(to_vector<glm::vec3>(middles), horizon_count, steep_cosine,
+                                   SkyNodes(to_vector<glm::vec3>(smooth_directions), to_vector<float>(smooth_weights)),
+                                   SkyNodes(to_vector<glm::vec3>(steep_directions), to_vector<float>(steep_weights)));
           },
           "middles"_a, "horizon_count"_a, "steep_cosine"_a, "smooth_weights"_a, "smooth_directions"_a,
           "steep_weights"_a, "steep_directions"_a)

@@ -121,8 +121,8 @@ DirectLight::Points DirectLight::points_on(int slot_index, const Corners& corner
     } else {
       for (std::size_t i = 0; i < count; ++i)
         points.set(n * count + i, mesh_.lifted_position(slot.face, slot.side,
-                                                          mesh_.element_parameters(slot.face, slot.cell, e,
-                                                                                   sample_triangle(pattern[first + i]))));
+                                                        mesh_.element_parameters(slot.face, slot.cell, e,
+                                                                                 sample_triangle(pattern[first + i]))));
     }
   }
   return points;

@@ -12,7 +12,7 @@ namespace transom {
 namespace {
 
 constexpr int kSamplesPerElement = 4;
-constexpr int kTellingSamples = 2;   // of these, the ones that say whether an element is partly lit
+constexpr int kTellingSamples = 2;  // of these, the ones that say whether an element is partly lit
 // At the edges of light, after the few: as many more first, and where an element turns out not to be evenly lit, these.
 constexpr int kMoreSamplesPerElement = 8, kManySamplesPerElement = 20;
 constexpr float kSameShare = 1e-3f;  // of the sun, between samples of an evenly lit element
@@ -195,8 +195,8 @@ std::vector<int> DirectLight::partly_lit(int slot_index, const std::vector<int>&
   return found;
 }
 
-// Means over elements of a slot at the edges of light. few: the first samples of all its elements. Where some more agree
-// with these, the edge has passed the element by.
+// Means over elements of a slot at the edges of light. few: the first samples of all its elements. Where some more
+// agree with these, the edge has passed the element by.
 void DirectLight::sample_edges(const Sun& sun, const Receivers& receivers, const SunlitSlot& slot,
                                std::vector<int> elements, const float* few, std::vector<float>& mean) const {
   const int slot_index = receivers.slots[slot.receiver];

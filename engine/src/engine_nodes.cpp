@@ -331,8 +331,7 @@ SparseRows Engine::grouped_rows(const std::vector<std::vector<Share>>& rows) con
   std::vector<PatchGroups::TypicalLight> lights;
   for (const std::vector<float>& light : smooth_lights_) lights.push_back(groups.typical(light));
   std::vector<std::vector<Share>> grouped(rows.size());
-  parallel_indices(rows.size(), 64,
-                   [&](std::size_t i) { grouped[i] = groups.grouped(rows[i], lights, kLikeness); });
+  parallel_indices(rows.size(), 64, [&](std::size_t i) { grouped[i] = groups.grouped(rows[i], lights, kLikeness); });
   return SparseRows::of(grouped);
 }
 

@@ -16,7 +16,7 @@ namespace {
 constexpr int kLargestClusterCount = 320;
 constexpr std::size_t kGrain = 128;
 constexpr std::size_t kBrightParts = 4;  // of bright patches, whose light is found at the same time
-constexpr float kLikeness = 4.5e-4f;      // of what a patch receives: what a group may err by
+constexpr float kLikeness = 4.5e-4f;     // of what a patch receives: what a group may err by
 constexpr std::size_t kProbeStep = 37;   // patches, between those that are lit to measure how fast light converges
 constexpr double kSafety = 2;            // on what has been measured
 constexpr int kLeastInnerCycles = 2, kMostInnerCycles = 5;  // with the likeness
@@ -138,8 +138,7 @@ void Interreflection::prepare(std::span<const std::vector<float>> smooth_lights)
   if (smooth_lights.empty()) return;
   std::vector<PatchGroups::TypicalLight> lights;
   for (const std::vector<float>& light : smooth_lights) lights.push_back(groups_.typical(light));
-  likeness_ =
-      CompactRows(rows_of([&](std::size_t i) { return groups_.grouped(exchange_row(i), lights, kLikeness); }));
+  likeness_ = CompactRows(rows_of([&](std::size_t i) { return groups_.grouped(exchange_row(i), lights, kLikeness); }));
   for (inner_cycles_ = kLeastInnerCycles;; ++inner_cycles_) {
     is_foretold_ = false;
     foretell();

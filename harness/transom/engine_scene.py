@@ -58,8 +58,10 @@ class EngineSky:
 
     def __init__(self, bins: SkyBins) -> None:
         self.bins = bins
-        single = [np.ascontiguousarray(array, dtype=np.float32) for array in (bins.directions, *bins.smooth, *bins.steep)]
-        middles, smooth_directions, smooth_weights, steep_directions, steep_weights = single
+        arrays = (bins.directions, *bins.smooth, *bins.steep)
+        middles, smooth_directions, smooth_weights, steep_directions, steep_weights = (
+            np.ascontiguousarray(array, dtype=np.float32) for array in arrays
+        )
         self._means = _engine.SkyBinMeans(
             middles,
             int(bins.row_counts[0]),

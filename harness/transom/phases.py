@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -21,8 +21,8 @@ from transom.scene.model import Scene, View
 Result = TypeVar("Result")
 
 PROCESS, THREAD, BESIDE_THREAD = 1, 1, 2
-"""Of the trace file: the engine's phases are steps of the calling thread, which its workers share, but for one that runs
-beside another."""
+"""Of the trace file: the engine's phases are steps of the calling thread, which its workers share, but for one that
+runs beside another."""
 
 
 @dataclass(frozen=True)

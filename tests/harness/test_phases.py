@@ -40,7 +40,8 @@ def test_the_engines_frame_is_the_whole_of_a_frame() -> None:
 @pytest.mark.parametrize("begin", [1.1, 1.3])
 def test_phases_beside_each_other_are_parts_of_the_same(begin: float) -> None:
     """Whichever begins first, and whichever ends within the other."""
-    spans = [("relight", 1.0, 3.0), ("first reflection", begin, 1.8), ("interreflection", 1.2, 2.5), ("gather", 2.5, 2.9)]
+    beside = [("first reflection", begin, 1.8), ("interreflection", 1.2, 2.5)]
+    spans = [("relight", 1.0, 3.0), *beside, ("gather", 2.5, 2.9)]
     assert phase_seconds(spans, "") == {
         "/relight": pytest.approx(2.0),
         "/relight/first reflection": pytest.approx(1.8 - begin),

@@ -34,6 +34,9 @@ class SkyPattern(Protocol):
         """Relative luminance at altitudes above 0 and cosines of the angle from the sun (equal shapes and precision in
         and out)."""
 
+    def formula(self) -> Formula | None:
+        """The same as parameters; None where they would not say all of it."""
+
 
 @dataclass(frozen=True)
 class SkyModel:
