@@ -14,7 +14,7 @@ namespace {
 constexpr int kSamplesPerElement = 4;
 constexpr int kTellingSamples = 2;  // of these, the ones that say whether an element is partly lit
 // At the edges of light, after the few: as many more first, and where an element turns out not to be evenly lit, these.
-constexpr int kMoreSamplesPerElement = 8, kManySamplesPerElement = 20;
+constexpr int kMoreSamplesPerElement = 12, kManySamplesPerElement = 16;
 constexpr float kSameShare = 1e-3f;  // of the sun, between samples of an evenly lit element
 constexpr std::size_t kGrain = 4;
 constexpr std::size_t kReceivers = 128;  // looked at together: they share what covers their face
