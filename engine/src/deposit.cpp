@@ -100,10 +100,10 @@ glm::vec3 DirectLight::illuminance(const std::vector<Beam>& beams, glm::vec3 poi
 
 // Lifted points of some elements of a slot, `samples` each.
 DirectLight::Points DirectLight::points_on(int slot_index, const Corners& corners, std::span<const int> elements,
-                                           std::size_t first, std::size_t count) const {
+                                           std::size_t samples) const {
   const Slot slot = mesh_.slot(slot_index);
   Points points;
-  points.resize(elements.size() * count);
+  points.resize(elements.size() * samples);
   const bool is_quad = mesh_.grid(slot.face).is_quad;
   const int per_slot = mesh_.elements_per_slot(), edge = mesh_.elements_per_edge();
   const float part = 1 / static_cast<float>(edge);
@@ -112,17 +112,17 @@ DirectLight::Points DirectLight::points_on(int slot_index, const Corners& corner
   for (std::size_t n = 0; n < elements.size(); ++n) {
     const int e = elements[n];
     const Patterns::Pattern pattern = patterns_->of(slot_index * per_slot + e);
-    const glm::vec2 corner(e % edge, e / edge);
+    const glm::vec2 first(e % edge, e / edge);
     if (is_quad) {
-      for (std::size_t i = 0; i < count; ++i) {
-        const glm::vec2 u = part * (corner + pattern[first + i]);
-        points.set(n * count + i, a + u.x * ab + u.y * ac + u.x * u.y * twist);
+      for (std::size_t i = 0; i < samples; ++i) {
+        const glm::vec2 u = part * (first + pattern[i]);
+        points.set(n * samples + i, a + u.x * ab + u.y * ac + u.x * u.y * twist);
       }
     } else {
-      for (std::size_t i = 0; i < count; ++i)
-        points.set(n * count + i, mesh_.lifted_position(slot.face, slot.side,
-                                                        mesh_.element_parameters(slot.face, slot.cell, e,
-                                                                                 sample_triangle(pattern[first + i]))));
+      for (std::size_t i = 0; i < samples; ++i)
+        points.set(n * samples + i, mesh_.lifted_position(slot.face, slot.side,
+                                                          mesh_.element_parameters(slot.face, slot.cell, e,
+                                                                                   sample_triangle(pattern[i]))));
     }
   }
   return points;
@@ -132,7 +132,7 @@ void DirectLight::sources_on_slot(int slot_index, const Corners& corners, glm::v
                                   std::vector<glm::vec3>& sum) const {
   std::vector<int> elements(static_cast<std::size_t>(mesh_.elements_per_slot()));
   std::iota(elements.begin(), elements.end(), 0);
-  const Points points = points_on(slot_index, corners, elements, 0, kSourceSamplesPerElement);
+  const Points points = points_on(slot_index, corners, elements, kSourceSamplesPerElement);
   for (std::size_t i = 0; i < points.size(); ++i)
     sum[i / kSourceSamplesPerElement] +=
         point_source_illuminance(points[i], normal) / static_cast<float>(kSourceSamplesPerElement);

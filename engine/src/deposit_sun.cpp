@@ -12,13 +12,12 @@ namespace transom {
 namespace {
 
 constexpr int kSamplesPerElement = 4;
-constexpr int kTellingSamples = 2;  // of these, the ones that say whether an element is partly lit
-// At the edges of light, after the few: as many more first, and where an element turns out not to be evenly lit, these.
-constexpr int kMoreSamplesPerElement = 12, kManySamplesPerElement = 16;
-constexpr float kSameShare = 1e-3f;  // of the sun, between samples of an evenly lit element
+constexpr int kTellingSamples = 2;             // of these, the ones that say whether an element is partly lit
+constexpr int kRefinedSamplesPerElement = 32;  // at the edges of light
+constexpr float kSameShare = 1e-3f;            // of the sun, between samples of an evenly lit element
 constexpr std::size_t kGrain = 4;
 constexpr std::size_t kReceivers = 128;  // looked at together: they share what covers their face
-static_assert(kPatternPoints >= kSamplesPerElement + kMoreSamplesPerElement + kManySamplesPerElement);
+static_assert(kPatternPoints >= kRefinedSamplesPerElement);
 
 }  // namespace
 
@@ -140,7 +139,7 @@ std::vector<float> DirectLight::sample_sun(const Sun& sun, const Receivers& rece
   std::vector<float> share(candidates.size() * samples_per_slot);
   parallel_indices(candidates.size(), kGrain, [&](std::size_t k) {
     const std::size_t i = candidates[k].receiver;
-    const Points points = points_on(receivers.slots[i], receivers.corners[i], elements, 0, kSamplesPerElement);
+    const Points points = points_on(receivers.slots[i], receivers.corners[i], elements, kSamplesPerElement);
     sun_transmission(sun, candidates[k], points, {&share[k * samples_per_slot], samples_per_slot});
   });
   return share;
@@ -195,37 +194,6 @@ std::vector<int> DirectLight::partly_lit(int slot_index, const std::vector<int>&
   return found;
 }
 
-// Means over elements of a slot at the edges of light. few: the first samples of all its elements. Where some more
-// agree with these, the edge has passed the element by.
-void DirectLight::sample_edges(const Sun& sun, const Receivers& receivers, const SunlitSlot& slot,
-                               std::vector<int> elements, const float* few, std::vector<float>& mean) const {
-  const int slot_index = receivers.slots[slot.receiver];
-  std::vector<float> sum(mean.size()), share;
-  const auto add_samples = [&](std::size_t first, std::size_t count) {
-    const Points points = points_on(slot_index, receivers.corners[slot.receiver], elements, first, count);
-    share.resize(points.size());
-    sun_transmission(sun, slot, points, share);
-    for (std::size_t n = 0; n < elements.size(); ++n) {
-      sum[elements[n]] = std::accumulate(&share[n * count], &share[n * count] + count, sum[elements[n]]);
-      mean[elements[n]] = sum[elements[n]] / static_cast<float>(first + count);
-    }
-  };
-  for (const int e : elements)
-    sum[e] = std::accumulate(few + e * kSamplesPerElement, few + (e + 1) * kSamplesPerElement, 0.f);
-  add_samples(kSamplesPerElement, kMoreSamplesPerElement);
-  std::vector<int> partly_lit;
-  for (std::size_t n = 0; n < elements.size(); ++n) {
-    const float* of_few = few + elements[n] * kSamplesPerElement;
-    const float* more = &share[n * kMoreSamplesPerElement];
-    const auto is_same = [&](float s) { return std::abs(s - *of_few) <= kSameShare; };
-    if (!std::all_of(of_few, of_few + kSamplesPerElement, is_same) ||
-        !std::all_of(more, more + kMoreSamplesPerElement, is_same))
-      partly_lit.push_back(elements[n]);
-  }
-  elements = std::move(partly_lit);
-  add_samples(kSamplesPerElement + kMoreSamplesPerElement, kManySamplesPerElement);
-}
-
 // Adds the sun to the light of elements, by receiver. Elements at the edges of light, as two samples of each tell, are
 // sampled densely; the others keep two samples that did not tell: then the thin shadows that none of them found are, in
 // the mean, made up for.
@@ -259,8 +227,14 @@ void DirectLight::add_sun(const Beam& sun, const Receivers& receivers, std::vect
       mean[e] =
           std::accumulate(own + e * kSamplesPerElement + kTellingSamples, own + (e + 1) * kSamplesPerElement, 0.f) /
           static_cast<float>(kSamplesPerElement - kTellingSamples);
-    sample_edges(seen, receivers, candidates[k], partly_lit(receivers.slots[i], place_of_slot, share, evenly_lit), own,
-                 mean);
+    const std::vector<int> elements = partly_lit(receivers.slots[i], place_of_slot, share, evenly_lit);
+    std::vector<float> refined(elements.size() * kRefinedSamplesPerElement);
+    const Points points = points_on(receivers.slots[i], receivers.corners[i], elements, kRefinedSamplesPerElement);
+    sun_transmission(seen, candidates[k], points, refined);
+    for (std::size_t n = 0; n < elements.size(); ++n)
+      mean[elements[n]] = std::accumulate(&refined[n * kRefinedSamplesPerElement],
+                                          &refined[n * kRefinedSamplesPerElement] + kRefinedSamplesPerElement, 0.f) /
+                          kRefinedSamplesPerElement;
     sum[i].resize(static_cast<std::size_t>(per_slot), glm::vec3(0));
     for (int e = 0; e < per_slot; ++e) sum[i][e] += mean[e] * full;
   });

@@ -76,8 +76,7 @@ class DirectLight {
   class Patterns;
   using Corners = std::array<glm::vec3, 4>;
   using Points = BeamOutlines::Points;
-  Points points_on(int slot, const Corners& corners, std::span<const int> elements, std::size_t first,
-                   std::size_t count) const;
+  Points points_on(int slot, const Corners& corners, std::span<const int> elements, std::size_t samples) const;
   struct SunlitSlot;
   class Sun;
   std::vector<SunlitSlot> reached(const Sun& sun, const Receivers& receivers) const;
@@ -89,8 +88,6 @@ class DirectLight {
                             const std::vector<float>& evenly_lit) const;
   std::vector<int> partly_lit(int slot, const std::vector<int>& place_of_slot, const std::vector<float>& share,
                               const std::vector<float>& evenly_lit) const;
-  void sample_edges(const Sun& sun, const Receivers& receivers, const SunlitSlot& slot, std::vector<int> elements,
-                    const float* few, std::vector<float>& mean) const;
   void add_sun(const Beam& sun, const Receivers& receivers, std::vector<std::vector<glm::vec3>>& sum,
                BeamPlan& plan) const;
   std::vector<std::size_t> reached_by_lobe(const Beam& lobe, const Receivers& receivers) const;
