@@ -75,6 +75,12 @@ Lighting Engine::direct_light_of(Condition condition) const {
   return lighting;
 }
 
+// In a loop on all threads. The others get no light.
+template <typename Body>
+void Engine::for_shown_nodes(const Body& body) const {
+  parallel_indices(shown_nodes_.size(), 64, [&](std::size_t k) { body(shown_nodes_[k]); });
+}
+
 // Light of the sky, the ground and panels on patches and at nodes.
 void Engine::find_sky_light(Lighting& lighting) const {
   const TracePhase phase(trace_, "sky");
@@ -83,8 +89,7 @@ void Engine::find_sky_light(Lighting& lighting) const {
   const SkyRadiance radiance = sky_radiance(lighting);
   parallel_indices(lighting.patch_sky.size(), 64,
                    [&](std::size_t p) { lighting.patch_sky[p] = patch_sky_.irradiance(p, radiance); });
-  parallel_indices(lighting.node_sky.size(), 64,
-                   [&](std::size_t i) { lighting.node_sky[i] = node_sky_.irradiance(i, radiance); });
+  for_shown_nodes([&](std::size_t i) { lighting.node_sky[i] = node_sky_.irradiance(i, radiance); });
 }
 
 // The first state of a relighting: its own direct light, and the indirect light of another, or none.
@@ -139,7 +144,7 @@ void Engine::gather_indirect(Lighting& lighting, const std::vector<glm::vec3>& f
   const std::vector<glm::vec3>& radiosity = lighting.patch_smooth_radiosity;
   const auto gather = [&](auto& sent_by_patches) {
     interreflection_->groups().append_means(sent_by_patches);
-    parallel_indices(first_reflection.size(), 64, [&](std::size_t i) {
+    for_shown_nodes([&](std::size_t i) {
       lighting.node_indirect[i] = first_reflection[i] + glm::vec3(node_patches_.dot(i, sent_by_patches));
     });
   };
@@ -168,7 +173,7 @@ void Engine::gather_close_by(Lighting& lighting) const {
     parallel_indices(nodes.size(), 64,
                      [&](std::size_t k) { sent[nodes[k]] = glm::vec4(sent_by_node(lighting, nodes[k]), 0); });
   }
-  parallel_indices(from_patches.size(), 64, add_near);
+  for_shown_nodes(add_near);
 }
 
 std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Lighting* previous,

@@ -1,6 +1,7 @@
 // The nodes of an engine: where light is gathered to be shown, the more densely the more it changes.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "streams.h"
 #include "transom/engine.h"
@@ -358,7 +359,11 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
 }
 
 void Engine::link_nodes(const Known& known) {
-  links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes(), nodes_->neighbours());
+  NodeNeighbours neighbours = nodes_->neighbours();
+  shown_nodes_.clear();
+  for (std::size_t i = 0; i < nodes_->nodes().size(); ++i)
+    if (!neighbours.of(i).empty()) shown_nodes_.push_back(i);
+  links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes(), std::move(neighbours));
   PointLinks::Known known_links;
   if (known.engine && known.engine->links_)
     known_links = {known.engine->links_.get(), known.change.get(), known.node, known.has_same_nodes,

@@ -235,6 +235,8 @@ class Engine {
   int ground_bin() const { return sky_index_->count() - 1; }
   void find_shafts(Condition& condition, std::vector<glm::vec3>& residual) const;
   double find_panel_radiance(const std::vector<glm::vec3>& radiosity, Lighting& lighting) const;
+  template <typename Body>
+  void for_shown_nodes(const Body& body) const;
   void find_sky_light(Lighting& lighting) const;
   bool solve_with_panels(Lighting& lighting, const Interreflection::AfterCycle& after_cycle) const;
   void light_always();
@@ -290,6 +292,7 @@ class Engine {
   CompactRows node_patches_;                  // all that nodes see of patches, far ones in groups
   std::vector<NodeShares> nodes_at_element_;  // what speaks for each element of patches, at its middle
   ExactRows node_near_;  // what the nodes, then the patches, send close by: those with their weights, less these
+  std::vector<std::size_t> shown_nodes_;  // not those inside solids, nor those of divided parts alone
   std::vector<std::vector<std::size_t>> nodes_of_round_;  // that gather what is close by before all do, and again
   std::unique_ptr<PointLinks> links_;
 
