@@ -102,9 +102,12 @@ std::vector<Share> PatchGroups::grouped(const std::vector<Share>& row, const std
 // Groups where, under each of the lights, weight times deviation is at most `tolerance` times what the row receives.
 std::vector<Share> PatchGroups::grouped_within(const std::vector<Share>& row, const std::vector<TypicalLight>& lights,
                                                const std::vector<float>& received, float tolerance) const {
+  constexpr int kUnknown = -2, kNone = -1;
   thread_local std::vector<float> weight;  // by group; 0 between calls
+  thread_local std::vector<int> largest;   // by group: the largest that may stand for it; kUnknown between calls
   thread_local std::vector<int> touched;
   weight.resize(std::max(weight.size(), groups_.size()), 0.f);
+  largest.resize(weight.size(), kUnknown);
   touched.clear();
   for (const Share& share : row)
     for (int g = parent_of_patch_[share.index]; g >= 0; g = groups_[g].parent) {
@@ -116,19 +119,30 @@ std::vector<Share> PatchGroups::grouped_within(const std::vector<Share>& row, co
       if (weight[g] * lights[k].deviation[g] > tolerance * received[k]) return false;
     return true;
   };
+  // Asked once for each group, from the largest around it down.
+  const auto largest_of = [&](int g, const auto& self) -> int {
+    if (g < 0) return kNone;
+    if (largest[g] == kUnknown) {
+      largest[g] = self(groups_[g].parent, self);
+      if (largest[g] == kNone && is_fine(g)) largest[g] = g;
+    }
+    return largest[g];
+  };
   std::vector<Share> result;
+  result.reserve(row.size());
   for (const Share& share : row) {
-    int chosen = -1;
-    for (int g = parent_of_patch_[share.index]; g >= 0; g = groups_[g].parent)
-      if (weight[g] < 0 || is_fine(g)) chosen = g;
+    const int chosen = largest_of(parent_of_patch_[share.index], largest_of);
     if (chosen < 0) {
       result.push_back(share);
-    } else if (weight[chosen] > 0) {
+    } else if (weight[chosen] != 0) {
       result.push_back({patch_count() + chosen, weight[chosen]});
-      weight[chosen] = -1;  // has been taken
+      weight[chosen] = 0;  // has been taken
     }
   }
-  for (const int g : touched) weight[g] = 0;
+  for (const int g : touched) {
+    weight[g] = 0;
+    largest[g] = kUnknown;
+  }
   return result;
 }
 
