@@ -1,7 +1,9 @@
 #include "transom/patch_groups.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <numeric>
 #include <tuple>
 
@@ -9,6 +11,7 @@ namespace transom {
 namespace {
 
 constexpr int kLargestGroup = 64;  // patches
+constexpr std::size_t kBits = 64;  // of a word
 
 }  // namespace
 
@@ -102,36 +105,49 @@ std::vector<Share> PatchGroups::grouped(const std::vector<Share>& row, const std
 // Groups where, under each of the lights, weight times deviation is at most `tolerance` times what the row receives.
 std::vector<Share> PatchGroups::grouped_within(const std::vector<Share>& row, const std::vector<TypicalLight>& lights,
                                                const std::vector<float>& received, float tolerance) const {
-  constexpr int kUnknown = -2, kNone = -1;
-  thread_local std::vector<float> weight;  // by group; 0 between calls
-  thread_local std::vector<int> largest;   // by group: the largest that may stand for it; kUnknown between calls
-  thread_local std::vector<int> touched;
-  weight.resize(std::max(weight.size(), groups_.size()), 0.f);
-  largest.resize(weight.size(), kUnknown);
-  touched.clear();
-  for (const Share& share : row)
-    for (int g = parent_of_patch_[share.index]; g >= 0; g = groups_[g].parent) {
-      if (weight[g] == 0) touched.push_back(g);
-      weight[g] += share.weight;
+  struct Scratch {  // zeros between calls
+    std::vector<float> weight;
+    std::vector<std::uint64_t> is_met;
+    std::vector<int> largest, met;
+  };
+  thread_local Scratch of_thread;
+  Scratch& scratch = of_thread;  // asked for once
+  scratch.weight.resize(std::max(scratch.weight.size(), groups_.size()), 0.f);
+  scratch.is_met.resize(scratch.weight.size() / kBits + 1, 0);
+  scratch.largest.resize(scratch.weight.size());
+  // By group: its weight in the row, whether it has any, bit by bit, and the largest that may stand for it (-1: none).
+  float* weight = scratch.weight.data();
+  std::uint64_t* is_met = scratch.is_met.data();
+  int* largest = scratch.largest.data();
+  std::vector<int>& met = scratch.met;  // halves before what they are halves of
+  met.clear();
+  const auto add = [&](int g, float of_row) {
+    if (g < 0) return;
+    weight[g] += of_row;
+    is_met[static_cast<std::size_t>(g) / kBits] |= std::uint64_t{1} << static_cast<std::size_t>(g) % kBits;
+  };
+  for (const Share& share : row) add(parent_of_patch_[share.index], share.weight);
+  for (std::size_t word = scratch.is_met.size(); word-- > 0;)
+    while (is_met[word] != 0) {  // adding a group to its parent adds to a lower bit, or to a word further on
+      const std::size_t bit = kBits - 1 - static_cast<std::size_t>(std::countl_zero(is_met[word]));
+      is_met[word] &= ~(std::uint64_t{1} << bit);
+      met.push_back(static_cast<int>(word * kBits + bit));
+      add(groups_[met.back()].parent, weight[met.back()]);
     }
   const auto is_fine = [&](int g) {
     for (std::size_t k = 0; k < lights.size(); ++k)
       if (weight[g] * lights[k].deviation[g] > tolerance * received[k]) return false;
     return true;
   };
-  // Asked once for each group, from the largest around it down.
-  const auto largest_of = [&](int g, const auto& self) -> int {
-    if (g < 0) return kNone;
-    if (largest[g] == kUnknown) {
-      largest[g] = self(groups_[g].parent, self);
-      if (largest[g] == kNone && is_fine(g)) largest[g] = g;
-    }
-    return largest[g];
-  };
+  for (std::size_t k = met.size(); k-- > 0;) {
+    const int g = met[k], parent = groups_[g].parent;
+    largest[g] = parent >= 0 ? largest[parent] : -1;
+    if (largest[g] < 0 && is_fine(g)) largest[g] = g;
+  }
   std::vector<Share> result;
   result.reserve(row.size());
   for (const Share& share : row) {
-    const int chosen = largest_of(parent_of_patch_[share.index], largest_of);
+    const int parent = parent_of_patch_[share.index], chosen = parent >= 0 ? largest[parent] : -1;
     if (chosen < 0) {
       result.push_back(share);
     } else if (weight[chosen] != 0) {
@@ -139,10 +155,7 @@ std::vector<Share> PatchGroups::grouped_within(const std::vector<Share>& row, co
       weight[chosen] = 0;  // has been taken
     }
   }
-  for (const int g : touched) {
-    weight[g] = 0;
-    largest[g] = kUnknown;
-  }
+  for (const int g : met) weight[g] = 0;
   return result;
 }
 
