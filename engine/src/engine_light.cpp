@@ -75,7 +75,7 @@ Lighting Engine::direct_light_of(Condition condition) const {
   return lighting;
 }
 
-// In a loop on all threads. The others get no light.
+// In a loop on all threads.
 template <typename Body>
 void Engine::for_shown_nodes(const Body& body) const {
   parallel_indices(shown_nodes_.size(), 64, [&](std::size_t k) { body(shown_nodes_[k]); });

@@ -1,7 +1,6 @@
 // The nodes of an engine: where light is gathered to be shown, the more densely the more it changes.
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "streams.h"
 #include "transom/engine.h"
@@ -225,8 +224,7 @@ void Engine::find_rounds(const NodeTrial& trial) {
       parallel_indices(node_count, 64, [&](std::size_t i) { next[i] = light.at_nodes[i] + node_near_.dot(i, sent); });
       after.push_back(std::move(next));
     }
-    for (std::size_t i = 0; i < node_count; ++i) {
-      if (!nodes_->is_exposed(i)) continue;
+    for (const std::size_t i : shown_nodes_) {
       const float bound = kAgreement * std::max(after.back()[i], light.dark);
       int round = kMostRounds;
       while (round > rounds[i] && std::abs(after[static_cast<std::size_t>(round)][i] - after.back()[i]) <= bound)
@@ -321,6 +319,7 @@ void Engine::gather_nodes(Known& known) {
     gather_new_nodes(trial, last_part, known);
     first_part = last_part;
   }
+  shown_nodes_ = nodes_->shown_nodes();
   resolve_near_light(trial);
   find_rounds(trial);
   keep_node_rows(trial, known);
@@ -359,11 +358,7 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
 }
 
 void Engine::link_nodes(const Known& known) {
-  NodeNeighbours neighbours = nodes_->neighbours();
-  shown_nodes_.clear();
-  for (std::size_t i = 0; i < nodes_->nodes().size(); ++i)
-    if (!neighbours.of(i).empty()) shown_nodes_.push_back(i);
-  links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes(), std::move(neighbours));
+  links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes(), nodes_->neighbours());
   PointLinks::Known known_links;
   if (known.engine && known.engine->links_)
     known_links = {known.engine->links_.get(), known.change.get(), known.node, known.has_same_nodes,

@@ -292,7 +292,7 @@ class Engine {
   CompactRows node_patches_;                  // all that nodes see of patches, far ones in groups
   std::vector<NodeShares> nodes_at_element_;  // what speaks for each element of patches, at its middle
   ExactRows node_near_;  // what the nodes, then the patches, send close by: those with their weights, less these
-  std::vector<std::size_t> shown_nodes_;  // not those inside solids, nor those of divided parts alone
+  std::vector<std::size_t> shown_nodes_;                  // the others get no light
   std::vector<std::vector<std::size_t>> nodes_of_round_;  // that gather what is close by before all do, and again
   std::unique_ptr<PointLinks> links_;
 

@@ -62,6 +62,8 @@ class NodeField {
   /// Exposed nodes that share a part which is not divided, and the nearest ones on other surfaces that are no farther
   /// than such parts are long.
   NodeNeighbours neighbours() const;
+  /// Those that some place is shown by: exposed ones, but for those of divided parts alone.
+  std::vector<std::size_t> shown_nodes() const;
   /// Lengths of a part along its two axes [m].
   glm::vec2 size(int part) const { return size(parts_[part]); }
 
