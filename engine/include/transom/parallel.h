@@ -29,7 +29,7 @@ void parallel_indices(std::size_t count, std::size_t grain, const Body& body) {
   });
 }
 
-/// Calls both, at the same time where a thread is free: while one does what only one thread can, the other has both.
+/// Calls both, at the same time where a thread is free: either fills the gaps that the other leaves.
 template <typename First, typename Second>
 void parallel_pair(const First& first, const Second& second) {
   parallel_indices(2, 1, [&](std::size_t i) { i == 0 ? first() : second(); });
