@@ -31,7 +31,7 @@ constexpr float kSloping = 2;  // from which on the middle is to be right to thi
 constexpr float kSlopingShare = 0.35f;
 constexpr float kNear = 0.25f;  // length of a part against the distance of what it sees
 
-constexpr float kLikeness = 3e-4f;  // of what a node receives from patches: what a group of these may err by
+constexpr float kGrouping = 3e-4f;  // of what a node receives from patches: what a group of these may err by
 
 constexpr int kMostRounds = 10;      // of gathering what is close by, before the one that all nodes take part in
 constexpr float kAgreement = 0.03f;  // of the light of a node, with which it leaves them
@@ -325,14 +325,12 @@ void Engine::gather_nodes(Known& known) {
   keep_node_rows(trial, known);
 }
 
-// What nodes see of patches, over patches and groups of them.
-SparseRows Engine::grouped_rows(const std::vector<std::vector<Share>>& rows) const {
+// Far patches in the rows of nodes give way to groups of them.
+void Engine::group_far_patches(std::vector<std::vector<Share>>& rows) const {
   const PatchGroups& groups = interreflection_->groups();
   std::vector<PatchGroups::TypicalLight> lights;
   for (const std::vector<float>& light : smooth_lights_) lights.push_back(groups.typical(light));
-  std::vector<std::vector<Share>> grouped(rows.size());
-  parallel_indices(rows.size(), 64, [&](std::size_t i) { grouped[i] = groups.grouped(rows[i], lights, kLikeness); });
-  return SparseRows::of(grouped);
+  parallel_indices(rows.size(), 64, [&](std::size_t i) { rows[i] = groups.grouped(rows[i], lights, kGrouping); });
 }
 
 // Moves what the nodes have seen to where relighting and later edits look for it.
@@ -341,7 +339,8 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
   facts_.kept_node_rows =
       static_cast<int>(std::count_if(known.node.begin(), known.node.end(), [](int node) { return node >= 0; }));
   known.has_same_nodes = known.has_same_faces() && nodes_->nodes() == known.engine->nodes_->nodes();
-  node_patches_ = CompactRows(grouped_rows(trial.patches));
+  group_far_patches(trial.patches);
+  node_patches_ = CompactRows(SparseRows::of(trial.patches));
   trial.patches.clear();
   node_sky_ = SkyRows(SparseRows::of(trial.rows, &GatherRow::sky), ground_bin());
   const auto found = std::make_shared<NodeRows>();

@@ -238,6 +238,20 @@ NodeShares NodeField::predict_middle(int index) const {
   return shares;
 }
 
+std::vector<std::size_t> NodeField::shown_nodes() const {
+  std::vector<char> is_shown(nodes_.size(), 0);
+  for (const Part& part : parts_) {
+    if (part.first_child >= 0) continue;
+    std::array<int, 5> nodes;
+    const std::size_t node_count = nodes_of(part, nodes);
+    for (std::size_t k = 0; k < node_count; ++k) is_shown[nodes[k]] = node_is_exposed_[nodes[k]];
+  }
+  std::vector<std::size_t> shown;
+  for (std::size_t i = 0; i < is_shown.size(); ++i)
+    if (is_shown[i]) shown.push_back(i);
+  return shown;
+}
+
 NodeShares NodeField::interpolate(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const {
   const int cell = mesh_.grid(face).locate(st).cell;
   int index = part_of_slot_[mesh_.slot_index(face, side, cell)];

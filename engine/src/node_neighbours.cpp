@@ -56,20 +56,6 @@ std::vector<int> NodeField::nearest_on_other_surfaces(int index, const std::vect
   return nearest;
 }
 
-std::vector<std::size_t> NodeField::shown_nodes() const {
-  std::vector<char> is_shown(nodes_.size(), 0);
-  for (const Part& part : parts_) {
-    if (part.first_child >= 0) continue;
-    std::array<int, 5> nodes;
-    const std::size_t node_count = nodes_of(part, nodes);
-    for (std::size_t k = 0; k < node_count; ++k) is_shown[nodes[k]] = node_is_exposed_[nodes[k]];
-  }
-  std::vector<std::size_t> shown;
-  for (std::size_t i = 0; i < is_shown.size(); ++i)
-    if (is_shown[i]) shown.push_back(i);
-  return shown;
-}
-
 NodeNeighbours NodeField::neighbours() const {
   std::vector<std::pair<int, int>> pairs;
   std::vector<float> reach(nodes_.size(), 0.f);  // 0: not exposed, or of divided parts alone

@@ -64,7 +64,7 @@ TEST(PatchGroups, AGroupedRowReceivesAsMuchOfTheFirstLightAndAsGoodAsAskedOfOthe
     EXPECT_NEAR(lights[0].received_by(grouped) / lights[0].received_by(row), 1, 1e-5f);
     const float bound = tolerance * static_cast<float>(grouped.size()) + 1e-5f;
     EXPECT_NEAR(lights[1].received_by(grouped) / lights[1].received_by(row), 1, bound);
-    EXPECT_NEAR(sum, 1, bound);
+    EXPECT_NEAR(sum, 1, tolerance + 1e-5f);
     EXPECT_LT(grouped.size(), before);
     before = grouped.size();
   }

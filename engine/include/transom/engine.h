@@ -202,7 +202,7 @@ class Engine {
   GatherRow surroundings_of_node(const Node& node, int known_node, const Known& known) const;
   void look_through_openings(const Node& node, int known_node, const Known& known, GatherRow& row) const;
   void gather_new_nodes(NodeTrial& trial, int first_part, Known& known);
-  SparseRows grouped_rows(const std::vector<std::vector<Share>>& rows) const;
+  void group_far_patches(std::vector<std::vector<Share>>& rows) const;
   void keep_node_rows(NodeTrial& trial, Known& known);
   void resolve_near_light(const NodeTrial& trial);
   void find_rounds(const NodeTrial& trial);
