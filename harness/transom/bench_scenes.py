@@ -28,12 +28,43 @@ LARGEST_SHARE = 0.25
 """Of the scene's bounding box: a larger object is the building."""
 
 
+PATCH_TOLERANCE = 0.1
+"""Of the patches that a point of a sweep wants: what the solve may have more or fewer."""
+
+TRIALS = 3
+
+
 @dataclass(frozen=True)
 class SceneEdit:
     """A scene that is solved, and scenes that it is edited to in turn."""
 
     before: Scene
     after: tuple[Scene, ...]
+
+
+def target_for_patches(scene: Scene, wanted: int) -> int:
+    """The `target_patch_count` of a solve that gives about `wanted` patches, by up to three trials with few rays.
+
+    The engine divides the area indoors by its target. Faces round up, the outdoors comes on top, and what light does not
+    reach is left out: a room with much furniture has twice the patches, and none has fewer than its faces.
+    """
+    from transom.engine import Engine, SolveOptions
+
+    target = wanted
+    for _ in range(TRIALS):
+        trial = SolveOptions(
+            target_patch_count=target,
+            elements_per_edge=1,
+            patch_rays=16,
+            patch_opening_rays=4,
+            node_rays=16,
+            node_opening_rays=4,
+        )
+        found = int(Engine.solve(scene, trial).facts()["patches"])
+        if abs(found - wanted) <= PATCH_TOLERANCE * wanted:
+            break
+        target = max(1, round(target * wanted / found))
+    return target
 
 
 def scene_edits(scene: Scene) -> dict[EditName, SceneEdit]:

@@ -29,6 +29,7 @@ from transom.bench_scenes import (
     movable_object,
     opening_face_count,
     scene_edits,
+    target_for_patches,
     with_other_glass,
     with_other_product,
     with_panes,
@@ -108,10 +109,21 @@ def test_the_object_that_edits_change_is_closed_and_free_of_panes(room: Scene, t
 
 def test_sweeps_are_over_patches_and_openings(room: Scene) -> None:
     points = bench_points(with_panes(room, 2), quick=False)
-    assert [point.target_patches for point in points if point.sweep == "patches"] == [1000, 3000, 10000, 30000]
+    assert [point.wanted_patches for point in points if point.sweep == "patches"] == [1000, 3000, 10000, 30000]
     assert [point.pane_split for point in points if point.sweep == "openings"] == [0, 2, 4]
     assert len({point.label() for point in points}) == len(points)
     assert len(bench_points(with_panes(room, 2), quick=True)) < len(points)
+
+
+def test_a_sweep_has_the_patches_that_it_wants(tmp_path: Path) -> None:
+    pytest.importorskip("transom._engine", reason="the engine is not built", exc_type=ImportError)
+    from transom.engine import Engine, SolveOptions
+
+    furnished = load_scene(write_scene(tmp_path / "room", obj=FURNISHED))
+    solved = Engine.solve(furnished, SolveOptions(target_patch_count=target_for_patches(furnished, 400)))
+    assert solved.facts()["patches"] == pytest.approx(400, rel=0.15)  # its own rays find a few more than trials do
+    asked = Engine.solve(furnished, SolveOptions(target_patch_count=400))
+    assert asked.facts()["patches"] != pytest.approx(400, rel=0.15)
 
 
 def test_interreflection_is_set_against_memory_and_gathering_against_rays() -> None:
@@ -148,7 +160,7 @@ def test_a_benchmark_that_is_not_built_is_no_limit(monkeypatch: pytest.MonkeyPat
 def test_every_quantity_is_measured_with_its_phases(tmp_path: Path) -> None:
     pytest.importorskip("transom._engine", reason="the engine is not built", exc_type=ImportError)
     folder = write_scene(tmp_path / "room", obj=FURNISHED)
-    found = measure_point(str(folder), Point("default", target_patches=200), 0.5)
+    found = measure_point(str(folder), Point("default", wanted_patches=200), 0.5)
     rows = {row.quantity: row for row in found.measurements}
     expected = {"load", "solve", "reglaze", "recolour", "relight_hour", "relight_sky", "relight_overcast", "frame_rays"}
     expected |= {"move_object", "add_object", "remove_object"}
