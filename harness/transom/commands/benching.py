@@ -21,7 +21,7 @@ def bench(
     output: Annotated[Path | None, typer.Option("--output", "-o", help="FILE.json; default build/bench/...")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer points of each sweep, in less time.")] = False,
     budget: Annotated[
-        float | None, typer.Option(min=1.0, metavar="SECONDS", help="Time to spend; default 200, or 40 with --quick.")
+        float | None, typer.Option(min=1.0, metavar="SECONDS", help="Time to spend; default 240, or 40 with --quick.")
     ] = None,
     growth: Annotated[
         bool, typer.Option("--growth", help="Costs of a hall over patches, openings and triangles; without SCENE.")
