@@ -45,8 +45,8 @@ class SceneEdit:
 def target_for_patches(scene: Scene, wanted: int) -> int:
     """The `target_patch_count` of a solve that gives about `wanted` patches, by up to three trials with few rays.
 
-    The engine divides the area indoors by its target. Faces round up, the outdoors comes on top, and what light does not
-    reach is left out: a room with much furniture has twice the patches, and none has fewer than its faces.
+    The engine divides the area indoors by its target. Faces round up, the outdoors comes on top, and what light does
+    not reach is left out: a room with much furniture has twice the patches, and none has fewer than its faces.
     """
     from transom.engine import Engine, SolveOptions
 
