@@ -130,7 +130,8 @@ class ColourSums {
   template <typename Column>
   void add(const Eight& weights, const Column* column) {
     for (std::size_t k = 0; k < kLanes; ++k)
-      sums_[k] = _mm_add_ps(sums_[k], _mm_mul_ps(_mm_set1_ps(weights.lane[k]), _mm_loadu_ps(&value_[column[k] / kStored].x)));
+      sums_[k] =
+          _mm_add_ps(sums_[k], _mm_mul_ps(_mm_set1_ps(weights.lane[k]), _mm_loadu_ps(&value_[column[k] / kStored].x)));
   }
   glm::vec4 total() const {
     const auto four = [&](int k) {

@@ -10,7 +10,7 @@
 namespace transom {
 
 /// Where the entries of sparse rows are: columns take two bytes each where these suffice. They are stored times
-/// `kStored`, so that a processor, which scales an index by up to eight, finds a colour of sixteen bytes without a shift.
+/// `kStored`: a processor scales an index by up to eight, and a colour has sixteen bytes.
 struct CompactColumns {
   static constexpr std::size_t kStored = 2;
 
