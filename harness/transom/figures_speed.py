@@ -128,7 +128,23 @@ def speed_error_figure(found: SpeedError, file_format: Literal["svg", "png"] = "
             axes.set_xlabel("time [s]")
         panels[0].set_ylabel("mean relative error of the interior's pixels [%]")
         panels[0].legend(frameon=False, loc="best")
+        separate_labels(figure)
         return _saved(figure, file_format)
+
+
+def separate_labels(figure: Any) -> None:
+    """Raises each annotation of a figure until it stands on none of the lower ones in its panel."""
+    figure.draw_without_rendering()
+    points_a_pixel = 72 / figure.dpi
+    for axes in figure.axes:
+        placed: list[Any] = []
+        for label in sorted(axes.texts, key=lambda text: text.get_window_extent().y0):
+            box = label.get_window_extent()
+            while any(box.overlaps(other) for other in placed):
+                step = 0.25 * box.height
+                label.xyann = (label.xyann[0], label.xyann[1] + step * points_a_pixel)
+                box = box.translated(0, step)
+            placed.append(box)
 
 
 def _panel(axes: Any, found: SpeedError, phase: Literal["cold", "hour"]) -> None:

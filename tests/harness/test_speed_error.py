@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 from harness_fakes import grey, small_scene
+from matplotlib.figure import Figure
 
 from transom import speed_error
 from transom.bench import Bench, Measurement, PhaseTimes
 from transom.cli import WRONG_USE, run_command
 from transom.compare import CaseNames
 from transom.errors import InputError
-from transom.figures_speed import scaling_figure, speed_error_figure
+from transom.figures_speed import scaling_figure, separate_labels, speed_error_figure
 from transom.provenance import current_provenance
 from transom.renderer import ImageResult
 from transom.speed_error import (
@@ -175,6 +176,20 @@ def test_figure_is_vector_or_pixels_and_names_every_program(monkeypatch: pytest.
     assert text.startswith("<svg")
     assert all(word in text for word in ("engine", "mitsuba", "time [s]", "error"))
     assert speed_error_figure(found, "png").startswith(b"\x89PNG")
+
+
+def test_labels_of_points_that_lie_together_stand_apart() -> None:
+    figure = Figure()
+    axes = figure.subplots()
+    places = [(0.5, 0.5), (0.5, 0.5), (0.51, 0.505), (0.1, 0.9)]
+    labels = [
+        axes.annotate(f"setting {k}", place, (6, 5), textcoords="offset points") for k, place in enumerate(places)
+    ]
+    separate_labels(figure)
+    figure.draw_without_rendering()
+    boxes = [label.get_window_extent() for label in labels]
+    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
+    assert (labels[3].xyann, labels[0].xyann) == ((6, 5), (6, 5))
 
 
 def test_scaling_figure_has_sizes_and_phases() -> None:
