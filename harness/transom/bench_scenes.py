@@ -151,20 +151,23 @@ def has_changeable_product(scene: Scene) -> bool:
 
 
 def with_other_product(scene: Scene, index: int) -> Scene:
-    """The scene with the first parameter of its first changeable product less by a thousandth, or by more for a
-    greater index: a product that was never looked at before."""
+    """The scene with the first parameter, a size, of its first changeable product greater by a thousandth, or by more
+    for a greater index: a product that was never looked at before."""
     opening = next(entry for entry in scene.openings if _is_changeable(entry))
     assert opening.product is not None
     parameters = {**load_product(opening.product.name).record.parameters, **dict(opening.product.parameters)}
     first = next(iter(parameters))
-    parameters[first] *= 1 - 1e-3 * (index + 1)
+    parameters[first] *= 1 + 1e-3 * (index + 1)
     product = choose_product(opening.product.name, parameters)
     openings = tuple(replace(entry, product=product) if entry is opening else entry for entry in scene.openings)
     return replace(scene, openings=openings)
 
 
 def _is_changeable(opening: Opening) -> bool:
-    return opening.product is not None and not is_file(opening.product.name)
+    """Whether it holds a product with parameters, which a file and a unit cell of triangles have not."""
+    if opening.product is None or is_file(opening.product.name):
+        return False
+    return bool(load_product(opening.product.name).record.parameters)
 
 
 def with_other_paint(scene: Scene, share: float) -> Scene:

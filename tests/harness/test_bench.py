@@ -40,6 +40,7 @@ from transom.errors import InputError
 from transom.fenestration.light import panel_light
 from transom.fenestration.reglazing import load_glazed
 from transom.machine_limits import Limit, memory_copy, utilisations
+from transom.products import list_products, load_product
 from transom.progress import CaseProgress
 from transom.provenance import current_provenance
 from transom.scene import content_key, load_scene
@@ -210,6 +211,15 @@ def test_published_schema_is_that_of_the_file() -> None:
 def test_of_needs_against(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command(["bench", "test_room", "--of", "HEAD"]) == WRONG_USE
     assert "--against" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", list_products())
+def test_every_product_with_parameters_takes_others(name: str) -> None:
+    scene = load_glazed("test_room", [f"south_upper={name}"])
+    assert has_changeable_product(scene) == bool(load_product(name).record.parameters)
+    if has_changeable_product(scene):
+        others = [with_other_product(scene, index) for index in (0, 100)]  # one that cannot be built is refused
+        assert len({content_key(entry) for entry in [scene, *others]}) == 3
 
 
 def test_a_scene_with_a_product_counts_its_lobes_and_takes_others() -> None:
