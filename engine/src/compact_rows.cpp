@@ -10,7 +10,6 @@ namespace transom {
 namespace {
 
 constexpr std::size_t kLanes = 8;
-constexpr std::size_t kStored = CompactColumns::kStored;
 
 // Eight sums, one of each lane, added up in pairs.
 float sum_of(const float (&lane)[kLanes]) {
@@ -40,8 +39,7 @@ class GreySums {
   explicit GreySums(const std::vector<float>& values) : value_(values.data()) {}
   template <typename Column>
   void add(Eight weights, const Column* column) {
-    constexpr int kStep = sizeof(float) / kStored;
-    sums_ = _mm256_add_ps(sums_, _mm256_mul_ps(weights, _mm256_i32gather_ps(value_, indices(column), kStep)));
+    sums_ = _mm256_add_ps(sums_, _mm256_mul_ps(weights, _mm256_i32gather_ps(value_, indices(column), sizeof(float))));
   }
   float total() const {
     alignas(32) float lane[kLanes];
@@ -64,7 +62,7 @@ class GreySums {
 class ColourSums {
  public:
   using Value = glm::vec4;
-  explicit ColourSums(const std::vector<glm::vec4>& values) : value_(&values.data()->x) {}
+  explicit ColourSums(const std::vector<glm::vec4>& values) : value_(values.data()) {}
   template <typename Column>
   void add(Eight weights, const Column* column) {
     const auto add_to = [](__m256& sum, __m256 weight, __m256 value) {
@@ -85,11 +83,10 @@ class ColourSums {
  private:
   template <typename Column>
   __m256 two(const Column* column) const {
-    return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(value_ + kStep * column[0])),
-                                _mm_loadu_ps(value_ + kStep * column[4]), 1);
+    return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(&value_[column[0]].x)),
+                                _mm_loadu_ps(&value_[column[4]].x), 1);
   }
-  static constexpr std::size_t kStep = 4 / kStored;  // floats
-  const float* value_;
+  const glm::vec4* value_;
   __m256 sums_[4] = {_mm256_setzero_ps(), _mm256_setzero_ps(), _mm256_setzero_ps(), _mm256_setzero_ps()};
 };
 #else
@@ -114,7 +111,7 @@ class GreySums {
   explicit GreySums(const std::vector<float>& values) : value_(values.data()) {}
   template <typename Column>
   void add(const Eight& weights, const Column* column) {
-    for (std::size_t k = 0; k < kLanes; ++k) sums_[k] += weights.lane[k] * value_[column[k] / kStored];
+    for (std::size_t k = 0; k < kLanes; ++k) sums_[k] += weights.lane[k] * value_[column[k]];
   }
   float total() const { return sum_of(sums_); }
 
@@ -130,8 +127,7 @@ class ColourSums {
   template <typename Column>
   void add(const Eight& weights, const Column* column) {
     for (std::size_t k = 0; k < kLanes; ++k)
-      sums_[k] =
-          _mm_add_ps(sums_[k], _mm_mul_ps(_mm_set1_ps(weights.lane[k]), _mm_loadu_ps(&value_[column[k] / kStored].x)));
+      sums_[k] = _mm_add_ps(sums_[k], _mm_mul_ps(_mm_set1_ps(weights.lane[k]), _mm_loadu_ps(&value_[column[k]].x)));
   }
   glm::vec4 total() const {
     const auto four = [&](int k) {
@@ -172,12 +168,11 @@ typename Sums::Value row_sum(const CompactColumns& columns, const std::vector<We
 CompactColumns::CompactColumns(const SparseRows& rows) : begin(rows.begin) {
   const auto is_before = [](const Share& a, const Share& b) { return a.index < b.index; };
   const auto last = std::max_element(rows.entries.begin(), rows.entries.end(), is_before);
-  are_short = last == rows.entries.end() ||
-              kStored * static_cast<std::size_t>(last->index) <= std::numeric_limits<std::uint16_t>::max();
+  are_short = last == rows.entries.end() || last->index <= std::numeric_limits<std::uint16_t>::max();
   const auto store = [&](auto& columns) {
     columns.reserve(rows.entries.size() + kLanes);
     for (const Share& share : rows.entries)
-      columns.push_back(static_cast<typename std::decay_t<decltype(columns)>::value_type>(kStored * share.index));
+      columns.push_back(static_cast<typename std::decay_t<decltype(columns)>::value_type>(share.index));
     columns.resize(columns.size() + kLanes, 0);
   };
   if (are_short)
@@ -196,7 +191,7 @@ std::vector<Share> ExactRows::row(std::size_t i) const {
   std::vector<Share> shares;
   for (std::size_t k = columns_.begin[i]; k < columns_.begin[i + 1]; ++k)
     shares.push_back(
-        {static_cast<int>((columns_.are_short ? columns_.short_column[k] : columns_.column[k]) / kStored), weight_[k]});
+        {static_cast<int>(columns_.are_short ? columns_.short_column[k] : columns_.column[k]), weight_[k]});
   return shares;
 }
 

@@ -27,11 +27,11 @@ PANE_CLEARANCE_M = 0.05
 LARGEST_SHARE = 0.25
 """Of the scene's bounding box: a larger object is the building."""
 
-
 PATCH_TOLERANCE = 0.1
-"""Of the patches that a point of a sweep wants: what the solve may have more or fewer."""
+"""Of the patches wanted: what a trial may find more or fewer."""
 
-TRIALS = 3
+MOST_TRIALS = 3
+"""Of a target for the patches wanted; the last one is corrected once more, and not tried again."""
 
 
 @dataclass(frozen=True)
@@ -43,15 +43,16 @@ class SceneEdit:
 
 
 def target_for_patches(scene: Scene, wanted: int) -> int:
-    """The `target_patch_count` of a solve that gives about `wanted` patches, by up to three trials with few rays.
+    """The `target_patch_count` of a solve that gives about `wanted` patches, by a few trials with few rays.
 
     The engine divides the area indoors by its target. Faces round up, the outdoors comes on top, and what light does
-    not reach is left out: a room with much furniture has twice the patches, and none has fewer than its faces.
+    not reach is left out: a room with much furniture has twice the patches, and none has fewer than its faces. Few rays
+    miss some patches: the solve has 3 to 6 % more (measured in two rooms).
     """
     from transom.engine import Engine, SolveOptions
 
     target = wanted
-    for _ in range(TRIALS):
+    for _ in range(MOST_TRIALS):
         trial = SolveOptions(
             target_patch_count=target,
             elements_per_edge=1,

@@ -9,11 +9,8 @@
 
 namespace transom {
 
-/// Where the entries of sparse rows are: columns take two bytes each where these suffice. They are stored times
-/// `kStored`: a processor scales an index by up to eight, and a colour has sixteen bytes.
+/// Where the entries of sparse rows are: columns take two bytes each where these suffice.
 struct CompactColumns {
-  static constexpr std::size_t kStored = 2;
-
   CompactColumns() = default;
   explicit CompactColumns(const SparseRows& rows);
 
