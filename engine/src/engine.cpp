@@ -65,6 +65,8 @@ Engine::Engine(const Engine& solved, SceneGeometry scene)
 
 void Engine::solve(const Engine* solved) {
   options_.validate();
+  for (OpeningGroup& group : scene_.openings)
+    if (group.panel) group.diffuse_reflectance = 0;  // comes with a product, and no solve depends on that
   trace_.enable(options_.trace);
   {
     const TracePhase phase(trace_, "geometry");
@@ -115,7 +117,6 @@ void Engine::solve(const Engine* solved) {
       const TracePhase phase(trace_, "likeness");
       lit_by_sources_ = direct_light_->deposit({}, receivers_);
       find_smooth_lights();
-      interreflection_->prepare(smooth_lights_);
     }
     {
       const TracePhase phase(trace_, "nodes");

@@ -33,8 +33,9 @@ constexpr float kNear = 0.25f;  // length of a part against the distance of what
 
 constexpr float kGrouping = 3e-4f;  // of what a node receives from patches: what a group of these may err by
 
-constexpr int kMostRounds = 10;      // of gathering what is close by, before the one that all nodes take part in
-constexpr float kAgreement = 0.03f;  // of the light of a node, with which it leaves them
+constexpr int kMostRounds = 10;        // of gathering what is close by, before the one that all nodes take part in
+constexpr float kAgreement = 0.03f;    // of the light of a node, with which it leaves them
+constexpr float kWorthARound = 0.03f;  // of that, which a sender lacks
 
 }  // namespace
 
@@ -202,34 +203,63 @@ void Engine::resolve_near_light(const NodeTrial& trial) {
   node_near_ = ExactRows(SparseRows::of(rows));
 }
 
-// Which nodes have to gather what is close by more than once: those that see little else, as under a slab. There light
-// decays over many reflections between places that a patch does not tell apart, and what nodes send comes to agree only
-// round by round.
-void Engine::find_rounds(const NodeTrial& trial) {
+// What nodes have of a light after they have gathered what is close by, those of each round first and then all.
+// before: what they had when they were gathered from for the last time.
+std::vector<float> Engine::gathered_in_rounds(const TrialLight& light, const std::vector<int>& rounds,
+                                              std::vector<float>& before) const {
+  const std::size_t node_count = nodes_->nodes().size();
+  before = light.at_nodes;
+  std::vector<float> sent(node_count), next(node_count);
+  sent.insert(sent.end(), light.radiosity.begin(), light.radiosity.end());
+  const auto gather = [&](std::size_t i) { next[i] = light.at_nodes[i] + node_near_.dot(i, sent); };
+  const auto send = [&](std::size_t i) { sent[i] = sent_of_trial(light, i, before[i]); };
+  parallel_indices(node_count, 64, send);
+  const int last = rounds.empty() ? 0 : *std::max_element(rounds.begin(), rounds.end());
+  for (int round = 1; round <= last; ++round) {
+    parallel_indices(node_count, 64, [&](std::size_t i) {
+      if (rounds[i] >= round) gather(i);
+    });
+    parallel_indices(node_count, 64, [&](std::size_t i) {
+      if (rounds[i] < round) return;
+      before[i] = next[i];
+      send(i);
+    });
+  }
+  parallel_indices(node_count, 64, gather);
+  return next;
+}
+
+// Which nodes have to gather what is close by more than once: those that send to others what is far from right before.
+// Under a slab light decays over many reflections between places that a patch does not tell apart, and what nodes send
+// comes to agree only round by round. Returns what nodes have then of the first of the trial's lights; nothing without
+// light.
+std::vector<float> Engine::find_rounds(const NodeTrial& trial) {
   const std::size_t node_count = nodes_->nodes().size();
   std::vector<int> rounds(node_count, 0);
+  std::vector<float> of_first_light, before;
   for (const TrialLight& light : trial.lights) {
     if (light.sky == kSunnySky) continue;  // its patches are lit by more sky than its nodes
-    std::vector<float> sent(node_count);
-    sent.insert(sent.end(), light.radiosity.begin(), light.radiosity.end());
-    std::vector<std::vector<float>> after{light.at_nodes};  // each round, the last of all included
-    for (int round = 0; round <= kMostRounds; ++round) {
-      const std::vector<float>& before = after.back();
-      parallel_indices(node_count, 64, [&](std::size_t i) {
-        const glm::vec3 rho = reflectance(nodes_->surface(i) / 2, nodes_->surface(i) % 2),
-                        all = rho * before[i] + (light.sky > 0 ? glm::vec3(0) : emitted_at_node(i));
-        sent[i] = (all.x + all.y + all.z) / 3;
-      });
-      std::vector<float> next(node_count);
-      parallel_indices(node_count, 64, [&](std::size_t i) { next[i] = light.at_nodes[i] + node_near_.dot(i, sent); });
-      after.push_back(std::move(next));
-    }
-    for (const std::size_t i : shown_nodes_) {
-      const float bound = kAgreement * std::max(after.back()[i], light.dark);
-      int round = kMostRounds;
-      while (round > rounds[i] && std::abs(after[static_cast<std::size_t>(round)][i] - after.back()[i]) <= bound)
-        --round;
-      rounds[i] = round;
+    const std::vector<float> settled = gathered_in_rounds(light, std::vector<int>(node_count, kMostRounds), before);
+    if (of_first_light.empty()) of_first_light = settled;
+    for (bool any = true; any;) {
+      const std::vector<float> found = gathered_in_rounds(light, rounds, before);
+      std::vector<char> is_wanted(node_count, 0);
+      for (const std::size_t i : shown_nodes_) {
+        const float bound = kAgreement * std::max(settled[i], light.dark);
+        if (std::abs(found[i] - settled[i]) <= bound) continue;
+        for (const Share& share : node_near_.row(i)) {
+          const auto sender = static_cast<std::size_t>(share.index);
+          if (sender >= node_count || rounds[sender] == kMostRounds) continue;
+          const float lacking =
+              sent_of_trial(light, sender, before[sender]) - sent_of_trial(light, sender, settled[sender]);
+          is_wanted[sender] |= std::abs(share.weight * lacking) > kWorthARound * bound;
+        }
+      }
+      any = false;
+      for (std::size_t i = 0; i < node_count; ++i) {
+        rounds[i] += is_wanted[i];
+        any |= is_wanted[i] != 0;
+      }
     }
   }
   nodes_of_round_.clear();
@@ -240,6 +270,14 @@ void Engine::find_rounds(const NodeTrial& trial) {
     if (nodes.empty()) break;
     nodes_of_round_.push_back(std::move(nodes));
   }
+  return of_first_light;
+}
+
+// Radiosity of a node under a trial's light, mean over the channels.
+float Engine::sent_of_trial(const TrialLight& light, std::size_t node, float irradiance) const {
+  const glm::vec3 all = reflectance(nodes_->surface(node) / 2, nodes_->surface(node) % 2) * irradiance +
+                        (light.sky > 0 ? glm::vec3(0) : emitted_at_node(node));
+  return (all.x + all.y + all.z) / 3;
 }
 
 // Whether light may change within a part otherwise than linearly, so that it is worth a node in its middle.
@@ -321,7 +359,13 @@ void Engine::gather_nodes(Known& known) {
   }
   shown_nodes_ = nodes_->shown_nodes();
   resolve_near_light(trial);
-  find_rounds(trial);
+  const std::vector<float> settled = find_rounds(trial);
+  if (!settled.empty()) {
+    send_unevenly(settled);
+    parallel_indices(trial.rows.size(), kGrain,
+                     [&](std::size_t i) { see_from_afar(trial.rows[i].near, trial.patches[i]); });
+  }
+  interreflection_->prepare(smooth_lights_);
   keep_node_rows(trial, known);
 }
 

@@ -98,6 +98,7 @@ std::shared_ptr<const GatherRow> Engine::surroundings_of_patch(int slot,
     return std::make_shared<const GatherRow>(gatherer_->surroundings_of_patch(slot, options_.patch_samples, seed));
   GatherRow row = *known_row;
   row.reached = known.change->renumbered(row.reached);
+  row.left = known.change->renumbered_elements(row.left);
   return std::make_shared<const GatherRow>(gatherer_->surroundings_of_patch(
       slot, options_.patch_samples, seed, std::move(row), *known.engine->gatherer_, *known.change));
 }

@@ -72,12 +72,12 @@ Gatherer::Gatherer(const LightMesh& mesh, const RayScene& rays, const std::vecto
 
 template <typename OriginOf>
 GatherRow Gatherer::gather_hemisphere(const OriginOf& origin_of, int count, std::uint32_t seed, Elements told) const {
-  thread_local std::vector<Ray> rays;
-  rays.clear();
-  add_rays(origin_of, SobolSequence(seed), coherent_order(count), count, rays);
+  thread_local Cast cast;
+  cast.clear();
+  add_rays(origin_of, SobolSequence(seed), coherent_order(count), count, cast);
   HemisphereTally tally;
   tally.slots.reserve(static_cast<std::size_t>(count));
-  add_hits(rays, told, tally);
+  add_hits(cast, told, tally);
   return std::move(tally).row(count, mesh_.faces().extent);
 }
 
@@ -88,22 +88,24 @@ GatherRow Gatherer::gather_from_point(const Node& point, int count, std::uint32_
   for_directions(point, SobolSequence(seed), coherent_order(count), count, [&](const Directions& to, std::size_t size) {
     Hit hits[kPointsAtOnce];
     rays_.intersect_from(point.position, to.x, to.y, to.z, RayScene::What::kAll, {hits, size});
-    for (std::size_t i = 0; i < size; ++i) add_hit(hits[i], {to.x[i], to.y[i], to.z[i]}, told, tally);
+    for (std::size_t i = 0; i < size; ++i) add_hit(hits[i], {to.x[i], to.y[i], to.z[i]}, -1, told, tally);
   });
   return std::move(tally).row(count, mesh_.faces().extent);
 }
 
 // Casts rays and counts what they meet.
-void Gatherer::add_hits(std::span<const Ray> rays, Elements told, HemisphereTally& tally) const {
+void Gatherer::add_hits(const Cast& cast, Elements told, HemisphereTally& tally) const {
   Hit hits[kBlock];
-  for (std::size_t begin = 0; begin < rays.size(); begin += kBlock) {
-    const std::span<const Ray> block = rays.subspan(begin, std::min<std::size_t>(kBlock, rays.size() - begin));
+  for (std::size_t begin = 0; begin < cast.rays.size(); begin += kBlock) {
+    const std::span block(&cast.rays[begin], std::min<std::size_t>(kBlock, cast.rays.size() - begin));
     rays_.intersect(RayScene::What::kAll, block, {hits, block.size()}, RayScene::Order::kCoherent);
-    for (std::size_t i = 0; i < block.size(); ++i) add_hit(hits[i], block[i].direction, told, tally);
+    for (std::size_t i = 0; i < block.size(); ++i)
+      add_hit(hits[i], block[i].direction, cast.elements.empty() ? -1 : cast.elements[begin + i], told, tally);
   }
 }
 
-void Gatherer::add_hit(const Hit& hit, glm::vec3 direction, Elements told, HemisphereTally& tally) const {
+// element: that the ray has left, of a patch; else -1.
+void Gatherer::add_hit(const Hit& hit, glm::vec3 direction, int element, Elements told, HemisphereTally& tally) const {
   if (hit.face < 0) {
     tally.bins.push_back(sky_(direction));
   } else if (mesh_.faces().is_inside_solid(hit.face, hit.side)) {
@@ -111,8 +113,9 @@ void Gatherer::add_hit(const Hit& hit, glm::vec3 direction, Elements told, Hemis
   } else {
     const int slot = mesh_.slot_at(hit);
     tally.slots.push_back(slot);
-    const float near = told == Elements::kNone ? 0 : near_distance_[static_cast<std::size_t>(slot)];
+    const float near = told == Elements::kNone ? 0 : near_distance(slot);
     if (hit.t < near || (told == Elements::kAll && near > 0)) tally.near.push_back(mesh_.element_at(hit));
+    if (element >= 0) tally.left.push_back(slot * mesh_.elements_per_slot() + element);
     tally.add_distance(hit.t, mesh_.faces());
   }
 }
@@ -275,7 +278,7 @@ void Gatherer::look_through_openings(const Node& point, GatherSamples samples, s
 auto Gatherer::places_on(int slot) const {
   return [this, slot](glm::vec2 u) {
     const Node place = mesh_.place_on(slot, u);
-    return Origin{place.position, place.normal};
+    return Origin{place.position, place.normal, mesh_.element_of_place(slot, u)};
   };
 }
 
@@ -293,12 +296,13 @@ void Gatherer::look_through_openings(int slot, GatherSamples samples, std::uint3
 // The rays of those points of a sequence that are below `count`.
 template <typename OriginOf>
 void Gatherer::add_rays(const OriginOf& origin_of, const SobolSequence& points, std::span<const std::uint32_t> indices,
-                        int count, std::vector<Ray>& rays) {
+                        int count, Cast& cast) {
   for (const std::uint32_t index : indices) {
     if (index >= static_cast<std::uint32_t>(count)) continue;
     const glm::vec4 u = points.point4(index);
     const Origin origin = origin_of(glm::vec2(u.z, u.w));
-    rays.push_back({origin.position, frame_from_normal(origin.normal) * sample_cosine_hemisphere({u.x, u.y})});
+    cast.rays.push_back({origin.position, frame_from_normal(origin.normal) * sample_cosine_hemisphere({u.x, u.y})});
+    cast.elements.push_back(origin.element);
   }
 }
 
@@ -317,8 +321,8 @@ bool Gatherer::gather_again(const OriginOf& origin_of, const Node& middle, float
                             Elements told, const Gatherer& before, const SceneChange& change, GatherRow& row) const {
   const HemisphereCells& cells = HemisphereCells::of(coherent_bits(count));
   thread_local std::vector<char> is_met;
-  thread_local std::vector<Ray> rays;
-  rays.clear();
+  thread_local Cast cast;
+  cast.clear();
   if (radius < Ray::kInfinity) {
     if (!change.may_meet(middle, radius, cells, is_met)) return true;
   } else {
@@ -332,22 +336,23 @@ bool Gatherer::gather_again(const OriginOf& origin_of, const Node& middle, float
     if (!is_met[cell.y * cells.per_axis() + cell.x]) continue;
     const std::span<const std::uint32_t> cell_order{&order[begin], per_cell};
     if (radius > 0)
-      add_rays(origin_of, points, cell_order, count, rays);
+      add_rays(origin_of, points, cell_order, count, cast);
     else
-      add_rays_from_point(middle, points, cell_order, count, rays);
+      add_rays_from_point(middle, points, cell_order, count, cast.rays);
   }
-  std::erase_if(rays, [&](const Ray& ray) { return !change.may_meet(ray); });
-  if (rays.empty()) return true;
+  cast.keep_if([&](const Ray& ray) { return change.may_meet(ray); });
+  if (cast.rays.empty()) return true;
   HemisphereTally lost, found;
-  before.add_hits(rays, told, lost);
-  add_hits(rays, told, found);
+  before.add_hits(cast, told, lost);
+  add_hits(cast, told, found);
   std::erase_if(lost.slots, [&](int& slot) { return (slot = change.slot_after(slot)) < 0; });
   const int per_slot = mesh_.elements_per_slot();
-  std::erase_if(lost.near, [&](int& element) {
-    const int slot = change.slot_after(element / per_slot);
-    element = slot * per_slot + element % per_slot;
-    return slot < 0;
-  });
+  for (std::vector<int>* elements : {&lost.near, &lost.left})
+    std::erase_if(*elements, [&](int& element) {
+      const int slot = change.slot_after(element / per_slot);
+      element = slot * per_slot + element % per_slot;
+      return slot < 0;
+    });
   return recount(row, std::move(lost), std::move(found), count, mesh_.faces().extent);
 }
 

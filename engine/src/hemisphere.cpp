@@ -63,6 +63,7 @@ GatherRow HemisphereTally::row(int count, float extent) && {
   row.escaped = static_cast<float>(bins.size()) * share;
   row.reached = count_up(slots, share);
   row.near = count_up(near, share);
+  row.left = count_up(left, share);
   row.sky = count_up(bins, kPi * share);
   row.inverse_distance = inverse_distance;
   row.harmonic_distance = harmonic_distance(exposed, inverse_distance, extent);
@@ -79,9 +80,10 @@ bool recount(GatherRow& known, HemisphereTally lost, HemisphereTally found, int 
   row.harmonic_distance = exposed > 0 ? harmonic_distance(exposed, row.inverse_distance, extent) : 0;
   const float known_share = 1 / static_cast<float>(std::max(1, known_exposed)),
               share = 1 / static_cast<float>(std::max(1, exposed));
-  int reached = 0, near = 0, escaped = 0;
+  int reached = 0, near = 0, left = 0, escaped = 0;
   if (!change_counts(known.reached, known_share, lost.slots, found.slots, share, row.reached, reached) ||
       !change_counts(known.near, known_share, lost.near, found.near, share, row.near, near) ||
+      !change_counts(known.left, known_share, lost.left, found.left, share, row.left, left) ||
       !change_counts(known.sky, kPi * known_share, lost.bins, found.bins, kPi * share, row.sky, escaped) ||
       reached + escaped != exposed || row.inverse_distance < 0)
     return false;

@@ -10,9 +10,11 @@
 namespace transom {
 
 struct HemisphereTally {
-  std::vector<int> slots, near, bins;  // one entry a ray: slots reached, near elements of them, bins of the open sky
-  int buried = 0;                      // rays that have met the inside of a solid
-  std::int64_t inverse_distance = 0;   // see GatherRow
+  // One entry a ray: slots reached, near elements of them, elements left by slot reached (GatherRow), bins of the open
+  // sky.
+  std::vector<int> slots, near, left, bins;
+  int buried = 0;                     // rays that have met the inside of a solid
+  std::int64_t inverse_distance = 0;  // see GatherRow
 
   void add_distance(float t, const Faces& faces);
 

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <map>
 #include <stdexcept>
 #include <tuple>
@@ -47,7 +48,7 @@ float size_of(glm::vec4 value) {
 Interreflection::Interreflection(const SparseRows& form_factors, const SparseRows& through,
                                  std::vector<glm::vec3> reflectance, std::vector<float> areas,
                                  const std::vector<PatchPlace>& places)
-    : form_factors_(form_factors),
+    : sent_(form_factors),
       through_(through),
       sent_through_(transposed(through)),
       reflectance_(std::move(reflectance)),
@@ -55,26 +56,33 @@ Interreflection::Interreflection(const SparseRows& form_factors, const SparseRow
       groups_(places, areas_),
       foretold_reflectance_(reflectance_.size(), glm::vec3(0)) {
   find_clusters(places);
-  find_operators();
-  const SparseRows exchange = rows_of([&](std::size_t i) { return exchange_row(i); });
-  exchange_ = ExactRows(exchange);
-  likeness_ = CompactRows(exchange);
+  receive(form_factors);
 }
 
-std::vector<Share> Interreflection::exchange_row(std::size_t patch) const {
-  std::vector<Share> row = form_factors_.row(patch);
-  const std::vector<Share> through = through_.row(patch);
-  row.insert(row.end(), through.begin(), through.end());
-  return row;
+void Interreflection::send(SparseRows sent) {
+  SparseRows received = transposed(sent);
+  parallel_indices(received.row_count(), kGrain, [&](std::size_t i) {
+    for (std::size_t k = received.begin[i]; k < received.begin[i + 1]; ++k)
+      received.entries[k].weight *= areas_[received.entries[k].index] / areas_[i];
+  });
+  sent_ = std::move(sent);
+  receive(received);
 }
 
-template <typename RowOf>
-SparseRows Interreflection::rows_of(const RowOf& row_of) const {
-  std::vector<std::vector<Share>> rows(areas_.size());
-  parallel_indices(rows.size(), kGrain, [&](std::size_t i) { rows[i] = row_of(i); });
+// Makes the exchange of what patches receive of each other and through openings.
+void Interreflection::receive(const SparseRows& received) {
   SparseRows all;
-  for (const std::vector<Share>& row : rows) all.append(row);
-  return all;
+  all.entries.reserve(received.entries.size() + through_.entries.size());
+  for (std::size_t i = 0; i < areas_.size(); ++i) {
+    for (const SparseRows* rows : std::initializer_list<const SparseRows*>{&received, &through_})
+      all.entries.insert(all.entries.end(), rows->entries.begin() + static_cast<std::ptrdiff_t>(rows->begin[i]),
+                         rows->entries.begin() + static_cast<std::ptrdiff_t>(rows->begin[i + 1]));
+    all.begin.push_back(all.entries.size());
+  }
+  exchange_ = ExactRows(all);
+  likeness_ = {};
+  find_operators(all);
+  is_foretold_ = false;
 }
 
 // Patches in one cube of space that face about the same way. The cubes grow until the clusters are few enough.
@@ -103,7 +111,7 @@ void Interreflection::find_clusters(const std::vector<PatchPlace>& places) {
 
 // With F_c and rho_c averaged over clusters by area: F_c (1 - rho_c F_c)^-1. One for all colours, with the least of
 // their reflectances: a larger one would carry more than there is in the others, and could diverge.
-void Interreflection::find_operators() {
+void Interreflection::find_operators(const SparseRows& received) {
   using Matrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const Eigen::Index m = cluster_count_;
   cluster_area_.assign(static_cast<std::size_t>(m), 0.f);
@@ -112,9 +120,8 @@ void Interreflection::find_operators() {
   for (std::size_t i = 0; i < areas_.size(); ++i) {
     cluster_area_[cluster_of_[i]] += areas_[i];
     cluster_reflectance_[cluster_of_[i]] += areas_[i] * reflectance_[i];
-    for (const SparseRows* rows : {&form_factors_, &through_})
-      for (std::size_t k = rows->begin[i]; k < rows->begin[i + 1]; ++k)
-        exchange(cluster_of_[i], cluster_of_[rows->entries[k].index]) += areas_[i] * rows->entries[k].weight;
+    for (std::size_t k = received.begin[i]; k < received.begin[i + 1]; ++k)
+      exchange(cluster_of_[i], cluster_of_[received.entries[k].index]) += areas_[i] * received.entries[k].weight;
   }
   for (Eigen::Index c = 0; c < m; ++c) exchange.row(c) /= std::max(cluster_area_[c], 1e-30f);
   Matrix system = Matrix::Identity(m, m);
@@ -138,7 +145,10 @@ void Interreflection::prepare(std::span<const std::vector<float>> smooth_lights)
   if (smooth_lights.empty()) return;
   std::vector<PatchGroups::TypicalLight> lights;
   for (const std::vector<float>& light : smooth_lights) lights.push_back(groups_.typical(light));
-  likeness_ = CompactRows(rows_of([&](std::size_t i) { return groups_.grouped(exchange_row(i), lights, kLikeness); }));
+  std::vector<std::vector<Share>> rows(areas_.size());
+  parallel_indices(rows.size(), kGrain,
+                   [&](std::size_t i) { rows[i] = groups_.grouped(exchange_.row(i), lights, kLikeness); });
+  likeness_ = CompactRows(SparseRows::of(rows));
   for (inner_cycles_ = kLeastInnerCycles;; ++inner_cycles_) {
     is_foretold_ = false;
     foretell();
@@ -206,8 +216,7 @@ void Interreflection::begin(const PatchLight& light, std::vector<Value>& left, s
   });
 }
 
-// Irradiance of all patches by what some of them send, by the columns of the exchange: those of F are its rows, times
-// the ratio of areas.
+// Irradiance of all patches by what some of them send.
 template <typename Value>
 std::vector<Value> Interreflection::received_from(std::span<const int> senders,
                                                   const std::vector<Value>& radiosity) const {
@@ -215,8 +224,8 @@ std::vector<Value> Interreflection::received_from(std::span<const int> senders,
   for (const int sender : senders) {
     const Value flux = areas_[sender] * radiosity[sender];
     const auto row = static_cast<std::size_t>(sender);
-    for (std::size_t k = form_factors_.begin[row]; k < form_factors_.begin[row + 1]; ++k)
-      received[form_factors_.entries[k].index] += form_factors_.entries[k].weight * flux;
+    for (std::size_t k = sent_.begin[row]; k < sent_.begin[row + 1]; ++k)
+      received[sent_.entries[k].index] += sent_.entries[k].weight * flux;
   }
   for (std::size_t i = 0; i < received.size(); ++i) received[i] /= std::max(areas_[i], 1e-30f);
   for (const int sender : senders) {
@@ -241,7 +250,9 @@ void Interreflection::carry_on(const std::vector<Value>& left, std::vector<Value
     if (cycle == inner_cycles_) break;
     for (std::size_t c = 0; c < m; ++c) before[c] = mean[c] + to(Value(), cluster_reflectance_[c]) * carried[c];
     groups_.append_means(sum);
-    parallel_indices(n, kGrain, [&](std::size_t i) { received[i] = likeness_.dot(i, sum); });
+    parallel_indices(n, kGrain, [&](std::size_t i) {
+      received[i] = likeness_.row_count() > 0 ? likeness_.dot(i, sum) : exchange_.dot(i, sum);
+    });
     for (std::size_t i = 0; i < n; ++i) sum[i] = left[i] + to(Value(), reflectance_[i]) * received[i];
   }
   for (std::size_t i = 0; i < n; ++i) radiosity[i] += sum[i];

@@ -94,6 +94,12 @@ Node LightMesh::place_on(int index, glm::vec2 u) const {
   return place_on_side(2 * own.face + own.side, cell_parameters(own.face, own.cell, sample_local(own.face, u)));
 }
 
+int LightMesh::element_of_place(int index, glm::vec2 u) const {
+  if (is_cluster(index)) return -1;
+  const int face = slot(index).face;
+  return element_grid(face).locate(sample_local(face, u)).cell;
+}
+
 Node LightMesh::place_on_element(int element, glm::vec2 u) const {
   const int index = element / elements_per_slot(), part = element % elements_per_slot();
   if (is_cluster(index)) {

@@ -208,4 +208,22 @@ TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<floa
   return defects;
 }
 
+SparseRows sent_unevenly(const SparseRows& form_factors, const std::vector<std::vector<Share>>& seen) {
+  SparseRows sent = form_factors;
+  parallel_indices(sent.row_count(), kGrain, [&](std::size_t i) {
+    double before = 0, after = 0;
+    auto next = seen[i].begin();
+    for (std::size_t k = sent.begin[i]; k < sent.begin[i + 1]; ++k) {
+      Share& share = sent.entries[k];
+      before += share.weight;
+      while (next != seen[i].end() && next->index < share.index) ++next;
+      if (next != seen[i].end() && next->index == share.index) share.weight *= next->weight;
+      after += share.weight;
+    }
+    const float scale = after > 0 ? static_cast<float>(before / after) : 1.f;
+    for (std::size_t k = sent.begin[i]; k < sent.begin[i + 1]; ++k) sent.entries[k].weight *= scale;
+  });
+  return sent;
+}
+
 }  // namespace transom

@@ -252,6 +252,8 @@ def drifts(blessed: BlessedCase, now: Measured, *, fresh_seed: bool) -> list[Dri
             rows.append(Drift(*place, *name, *found, math.nan, 0.0, 0, None))
         elif before.category == UP_CLOSE and before.spread > CHANCE_SPREAD * abs(before.mean):
             continue  # in the sun or in the dark by whether a ray outdoors has found it: no room has light from it
+        elif fresh_seed and before.category == UP_CLOSE and after.value < CHANCE_SPREAD * before.value:
+            continue  # the same, lit by every blessed seed: few seeds do not show that chance has lit it
         elif fresh_seed and before.category == UP_CLOSE and before.spread == 0:
             continue  # a buried face, dark by every blessed seed: one of its few rays by chance would light it
         elif fresh_seed:

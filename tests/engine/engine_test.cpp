@@ -107,6 +107,28 @@ TEST(Engine, OpenWallIsNamedWithItsPlace) {
   }
 }
 
+TEST(Engine, WhatStandsCloseTogetherKeepsNoLightFromTheRoom) {
+  // Slabs 12 cm apart: patches see out between them with a part of theirs alone. Even ones kept 0.8 % from the wall.
+  SceneGeometry scene = test::roof_light_room(0.7f);
+  for (int k = 0; k < 6; ++k) test::add_box(scene, {0.6, 0.6 + 0.3 * k, 0.2}, {3.2, 0.78 + 0.3 * k, 1.6}, 0);
+  std::vector<glm::dvec3> points;
+  for (double x = 0.4; x < 3.8; x += 0.4)
+    for (double z = 0.3; z < 2.6; z += 0.4) points.push_back({x, 2.99, z});
+  const auto mean = [&](int patches) {
+    SolveOptions options;
+    options.target_patch_count = patches;
+    options.node_samples = {512, 256};
+    const Engine engine(scene, test::tregenza(), options);
+    const auto light = engine.relight(test::uniform_sky(1000));
+    double sum = 0;
+    for (const Irradiance& e : engine.illuminance(
+             *light, engine.sensors(points, std::vector<glm::vec3>(points.size(), {0, -1, 0}), {4096, 1024})))
+      sum += e.indirect.y;
+    return sum;
+  };
+  EXPECT_NEAR(mean(1500) / mean(16000), 1, 0.006);
+}
+
 TEST(Engine, OpeningThatLooksIndoorsIsRefused) {
   SceneGeometry scene = roof_light_room(0.5f);
   glm::ivec4& pane = scene.faces.back();

@@ -57,6 +57,35 @@ TEST(Interreflection, TwoLevelsFindWhatSweepsFind) {
       EXPECT_NEAR(e[i][channel], expected[i][channel], 1e-4 * expected[i][channel]) << i;
 }
 
+TEST(Interreflection, CarriesAnExchangeThatIsNotReciprocal) {
+  Chain chain(300);
+  for (std::size_t i = 0; i < chain.areas.size(); ++i) chain.areas[i] = 1 + 0.5f * static_cast<float>(i % 3);
+  Interreflection prepared(chain.form_factors, chain.through, chain.reflectance, chain.areas, chain.places);
+  // Each sends twice as much to those of odd number as to the others.
+  SparseRows sent = chain.form_factors, received;
+  for (Share& share : sent.entries) share.weight *= share.index % 2 ? 4 / 3.f : 2 / 3.f;
+  prepared.send(sent);
+  for (std::size_t i = 0; i < chain.areas.size(); ++i) {
+    std::vector<Share> row;
+    for (std::size_t j = 0; j < chain.areas.size(); ++j)
+      for (const Share& share : sent.row(j))
+        if (share.index == static_cast<int>(i))
+          row.push_back({static_cast<int>(j), share.weight * chain.areas[j] / chain.areas[i]});
+    received.append(row);
+  }
+  chain.form_factors = received;
+  const std::vector<glm::vec3> expected = swept(chain, 400);
+  const std::vector<int> bright{3, 50, 51};
+  for (const bool has_bright : {false, true}) {
+    std::vector<glm::vec3> e;
+    const std::span<const int> some = has_bright ? std::span<const int>(bright) : std::span<const int>();
+    prepared.solve({chain.emitted, chain.direct, false, some}, 1e-7, 1000, e);
+    for (std::size_t i = 0; i < e.size(); ++i)
+      for (int channel = 0; channel < 3; ++channel)
+        EXPECT_NEAR(e[i][channel], expected[i][channel], 1e-4 * expected[i][channel]) << i;
+  }
+}
+
 TEST(Interreflection, ConvergesWhereOneColourIsAlmostLossless) {
   Chain chain(400);
   for (glm::vec3& rho : chain.reflectance) rho = {0.99f, 0.98f, 0.6f};

@@ -21,8 +21,8 @@ OPTIONS = SolveOptions(
 )
 
 
-def overcast_sensors(scene: Scene) -> tuple[np.ndarray, Engine]:
-    engine = Engine.solve(scene, OPTIONS)
+def overcast_sensors(scene: Scene, options: SolveOptions = OPTIONS) -> tuple[np.ndarray, Engine]:
+    engine = Engine.solve(scene, options)
     engine.relight(resolve_condition(replace(scene.conditions[0], sky="overcast"), scene.site))
     sensors = scene.sensors[0]
     return engine.illuminance(sensors.points, sensors.normals, rays=8192, opening_rays=2048)["total"][:, 1], engine
@@ -64,10 +64,14 @@ def test_small_faces_share_patches() -> None:
 
 @pytest.mark.slow
 def test_finer_bodies_leave_the_light_of_the_room_as_it_is() -> None:
-    """The bodies' shape changes by less than 1 % between these; trees keep their area, their leaves become smaller."""
-    coarse, own_patches = overcast_sensors(hall_scene(700, 12))
-    fine, shared_patches = overcast_sensors(hall_scene(24000, 12))
-    assert own_patches.facts()["faces"] < 2 * OPTIONS.target_patch_count < shared_patches.facts()["faces"]
+    """The bodies' shape changes by less than 1 % between these; trees keep their area, their leaves become smaller.
+
+    With fewer leaves, whether one hangs over a sensor is luck: a hall of 700 triangles is lit by 15 % more sky.
+    """
+    options = replace(OPTIONS, target_patch_count=1500)
+    coarse, own_patches = overcast_sensors(hall_scene(2900, 12), options)
+    fine, shared_patches = overcast_sensors(hall_scene(24000, 12), options)
+    assert own_patches.facts()["faces"] < 2 * options.target_patch_count < shared_patches.facts()["faces"]
     np.testing.assert_allclose(fine.mean(), coarse.mean(), rtol=0.03)
 
 

@@ -37,18 +37,23 @@ SEEDS = 4
 
 
 class PlantedEngine(EngineRenderer):
-    """The engine with a fault: in the scene or the condition that it is given, its options, or its answer."""
+    """The engine with a fault: in the scene or the condition that it is given, or in what its answers lack.
+
+    lost_indirect: share of the indirect light of pictures; lost_flux: of all flux, in the energy balance.
+    """
 
     def __init__(
         self,
         name: str,
         scene: Callable[[Scene], Scene] = lambda scene: scene,
         condition: Callable[[Condition], Condition] = lambda condition: condition,
-        options: Mapping[str, Any] | None = None,
+        lost_indirect: float = 0.0,
+        lost_flux: float = 0.0,
     ) -> None:
         super().__init__()
         self.version = f"planted {name}"
-        self._scene, self._condition, self._changed = scene, condition, dict(options or {})
+        self._scene, self._condition = scene, condition
+        self._lost_indirect, self._lost_flux = lost_indirect, lost_flux
 
     def render(
         self,
@@ -58,8 +63,10 @@ class PlantedEngine(EngineRenderer):
         options: Mapping[str, Any],
         progress: Progress | None = None,
     ) -> ImageResult:
-        scene, condition, options = self._scene(scene), self._condition(condition), {**options, **self._changed}
-        return super().render(scene, condition, view, options, progress)
+        whole = super().render(self._scene(scene), self._condition(condition), view, options, progress)
+        lost = self._lost_indirect * whole.components["indirect"]
+        components = {**whole.components, "indirect": whole.components["indirect"] - lost}
+        return dataclasses.replace(whole, mean=whole.mean - lost, components=components)
 
     def illuminance(
         self,
@@ -70,8 +77,9 @@ class PlantedEngine(EngineRenderer):
         options: Mapping[str, Any],
         progress: Progress | None = None,
     ) -> SensorResult:
-        scene, condition, options = self._scene(scene), self._condition(condition), {**options, **self._changed}
-        return super().illuminance(scene, condition, points, normals, options, progress)
+        whole = super().illuminance(self._scene(scene), self._condition(condition), points, normals, options, progress)
+        balance = whole.facts["energy_imbalance"] - self._lost_flux
+        return dataclasses.replace(whole, facts={**whole.facts, "energy_imbalance": balance})
 
 
 @pytest.fixture(scope="module")
@@ -173,9 +181,10 @@ def test_turned_sky_is_named(monkeypatch: pytest.MonkeyPatch, folder: Path, base
 
 def test_bounces_that_stop_early_are_named(monkeypatch: pytest.MonkeyPatch, folder: Path, baseline: Baseline) -> None:
     assert baseline
-    found, words = checked(monkeypatch, folder, PlantedEngine("bounces", options={"tolerance": 0.5}))
-    assert {"indirect", "energy", "plan"} <= found and not found & {"sky", "sun", "sun shadow"}
-    assert "the bounces stop early" in words
+    # No setting of the engine does so: what a first cycle leaves is carried to its end before the engine stops.
+    found, words = checked(monkeypatch, folder, PlantedEngine("bounces", lost_indirect=0.025, lost_flux=0.01))
+    assert {"indirect", "energy"} <= found and not found & {"sky", "sun", "sun shadow", "plan"}
+    assert "Flux is lost: the transfer is too weak, or the bounces stop early" in words
 
 
 def test_moved_shadow_is_named_in_millimetres(

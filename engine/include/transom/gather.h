@@ -41,6 +41,9 @@ struct GatherRow {
   std::vector<Share> sky;
   /// Of a point: elements reached, as `reached` has them by slot; of near patches, or of all where that was asked for.
   std::vector<Share> near;
+  /// Of a patch but a cluster: the same by the patch's own element that the ray has left, as slot reached * elements
+  /// per slot + own element.
+  std::vector<Share> left;
   float escaped = 0;            ///< share of the hemisphere that meets nothing: open sky
   float exposure = 1;           ///< share of the receiver that does not lie inside a solid
   float harmonic_distance = 0;  ///< harmonic mean distance of what is seen [m]
@@ -75,6 +78,9 @@ class Gatherer {
   GatherRow surroundings_of_patch(int slot, GatherSamples samples, std::uint32_t seed, GatherRow known,
                                   const Gatherer& before, const SceneChange& change) const;
 
+  /// Distance [m] up to which points see a slot by its elements; 0 for a cluster.
+  float near_distance(int slot) const { return near_distance_[static_cast<std::size_t>(slot)]; }
+
   /// Whether a ray that `look_through_openings` casts with these samples and seed may meet what has changed. False is
   /// certain.
   bool may_meet_through_openings(const Node& point, GatherSamples samples, std::uint32_t seed,
@@ -97,6 +103,29 @@ class Gatherer {
   };
   struct Origin {
     glm::vec3 position, normal;
+    int element = -1;  // of the patch that it is on
+  };
+  // Rays, and the elements of a patch that they leave, if they do not leave a point.
+  struct Cast {
+    std::vector<Ray> rays;
+    std::vector<int> elements;
+
+    void clear() {
+      rays.clear();
+      elements.clear();
+    }
+    template <typename Condition>
+    void keep_if(const Condition& is_kept) {
+      std::size_t kept = 0;
+      for (std::size_t i = 0; i < rays.size(); ++i) {
+        if (!is_kept(rays[i])) continue;
+        rays[kept] = rays[i];
+        if (!elements.empty()) elements[kept] = elements[i];
+        ++kept;
+      }
+      rays.resize(kept);
+      if (!elements.empty()) elements.resize(kept);
+    }
   };
   enum class Elements { kNone, kNear, kAll };  // which of those reached are told, besides their slots
   auto places_on(int slot_index) const;
@@ -106,11 +135,11 @@ class Gatherer {
   bool gather_again(const OriginOf& origin_of, const Node& middle, float radius, int count, std::uint32_t seed,
                     Elements told, const Gatherer& before, const SceneChange& change, GatherRow& row) const;
   GatherRow gather_from_point(const Node& point, int count, std::uint32_t seed, Elements told) const;
-  void add_hits(std::span<const Ray> rays, Elements told, HemisphereTally& tally) const;
-  void add_hit(const Hit& hit, glm::vec3 direction, Elements told, HemisphereTally& tally) const;
+  void add_hits(const Cast& cast, Elements told, HemisphereTally& tally) const;
+  void add_hit(const Hit& hit, glm::vec3 direction, int element, Elements told, HemisphereTally& tally) const;
   template <typename OriginOf>
   static void add_rays(const OriginOf& origin_of, const SobolSequence& points, std::span<const std::uint32_t> indices,
-                       int count, std::vector<Ray>& rays);
+                       int count, Cast& cast);
   static void add_rays_from_point(const Node& point, const SobolSequence& points,
                                   std::span<const std::uint32_t> indices, int count, std::vector<Ray>& rays);
   std::vector<float> past_further_openings(std::span<const Ray> rays, std::vector<Hit>& hits) const;

@@ -22,7 +22,7 @@ struct Material {
 /// glazing product: all of one orientation, and nothing passes them straight (transmittance 0).
 struct OpeningGroup {
   std::vector<float> transmittance;  ///< at cos(theta) = i / (size - 1); linear in between; the same both ways
-  float diffuse_reflectance = 0;     ///< of the room side, hemispherical
+  float diffuse_reflectance = 0;     ///< of the room side, hemispherical; panels have their product's
   std::optional<PanelFrame> panel = std::nullopt;
 
   float transmittance_at(float cos_theta) const;

@@ -31,9 +31,13 @@ struct PatchLight {
 /// themselves, by the columns of the exchange.
 class Interreflection {
  public:
-  /// form_factors F, reciprocal, and through K (light through openings) are kept by reference.
+  /// form_factors F: reciprocal. through K: light through openings.
   Interreflection(const SparseRows& form_factors, const SparseRows& through, std::vector<glm::vec3> reflectance,
                   std::vector<float> areas, const std::vector<PatchPlace>& places);
+
+  /// Replaces F by an exchange that is not reciprocal. sent: by sender, the share of what it sends that each patch
+  /// receives. To be prepared anew.
+  void send(SparseRows sent);
 
   /// Makes the likeness coarse where smooth lights, such as these radiosities of patches, allow it. Until then it is
   /// the exchange itself.
@@ -64,10 +68,8 @@ class Interreflection {
 
  private:
   void find_clusters(const std::vector<PatchPlace>& places);
-  std::vector<Share> exchange_row(std::size_t patch) const;
-  template <typename RowOf>
-  SparseRows rows_of(const RowOf& row_of) const;
-  void find_operators();
+  void receive(const SparseRows& received);
+  void find_operators(const SparseRows& received);
   template <typename Value>
   int solve_as(const PatchLight& light, double tolerance, int maximum_cycles, std::vector<glm::vec3>& irradiance,
                const AfterCycle& after_cycle) const;
@@ -88,14 +90,14 @@ class Interreflection {
   template <typename Value>
   void cluster_means(const std::vector<Value>& values, std::vector<Value>& means) const;
 
-  const SparseRows& form_factors_;
-  const SparseRows& through_;
-  SparseRows sent_through_;  // K by columns
+  SparseRows sent_;          // by sender: the share of what it sends that reaches others
+  SparseRows through_;       // K,
+  SparseRows sent_through_;  // and by columns
   std::vector<glm::vec3> reflectance_;
   std::vector<float> areas_;
   PatchGroups groups_;
-  ExactRows exchange_;             // F + K
-  CompactRows likeness_;           // of it, over patches and groups
+  ExactRows exchange_;             // by receiver, with K
+  CompactRows likeness_;           // of it, over patches and groups; none until it is prepared
   int inner_cycles_ = 3;           // with the likeness, in each cycle
   double foretold_shrinking_ = 1;  // of what is left over, by a cycle after the first
   bool is_foretold_ = false;       // with these reflectances, or larger ones:

@@ -65,7 +65,9 @@ class LightMesh {
 
   /// A place of a slot from two uniform numbers, uniform in area on congruent cells: lifted, with the face's normal.
   Node place_on(int slot, glm::vec2 u) const;
-  /// The same of an element.
+  /// The element of a slot, from 0, that this place is on; -1 on a cluster.
+  int element_of_place(int slot, glm::vec2 u) const;
+  /// The same as place_on of an element.
   Node place_on_element(int element, glm::vec2 u) const;
   /// The middle of a slot or an element, lifted. The normal of a cluster is 0, since it faces many ways; that of an
   /// element of one is the mean of its faces.

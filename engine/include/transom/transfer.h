@@ -63,4 +63,9 @@ struct TransferDefects {
 TransferDefects make_reciprocal(SparseRows& form_factors, const std::vector<float>& areas,
                                 const std::vector<float>& row_sums);
 
+/// Shares of what patches send that reach each other, by sender, where patches do not send evenly: form factors times
+/// what is seen of the sender's radiosity, relative to its mean. seen: by sender, sorted by the patch that sees it; 1
+/// for others. Rows add up to what they do in `form_factors`: nothing is lost.
+SparseRows sent_unevenly(const SparseRows& form_factors, const std::vector<std::vector<Share>>& seen);
+
 }  // namespace transom
