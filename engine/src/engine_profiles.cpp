@@ -12,11 +12,12 @@ constexpr std::size_t kGrain = 16;
 }  // namespace
 
 // Radiosity of elements relative to that of their patch, by patch * elements per slot + element, as the nodes around
-// them have it. What no node speaks for, and clusters, count as even.
+// them have it. What no node speaks for, clusters and emitters, whose own light is even, count as even.
 std::vector<float> Engine::element_profiles(const std::vector<float>& node_irradiance) const {
   const auto per_slot = static_cast<std::size_t>(mesh_->elements_per_slot());
   std::vector<float> profiles(nodes_at_element_.size(), 1.f);
   parallel_indices(slot_of_patch_.size(), kGrain, [&](std::size_t p) {
+    if (patch_emitted_[p] != glm::vec3(0)) return;
     std::vector<float> rays(per_slot, 0.f);  // that leave each element
     for (const Share& share : patch_rows_[p].around->left)
       rays[static_cast<std::size_t>(share.index) % per_slot] += share.weight;
