@@ -175,7 +175,9 @@ std::vector<Share> Engine::resolved_by_nodes(const std::vector<Share>& elements)
   for (const Share& share : elements) {
     const int patch = patch_of_slot_[share.index / per_slot];
     if (patch < 0) continue;
-    const NodeShares& nodes = nodes_at_element_[static_cast<std::size_t>(patch * per_slot + share.index % per_slot)];
+    const auto element = static_cast<std::size_t>(patch) * static_cast<std::size_t>(per_slot) +
+                         static_cast<std::size_t>(share.index % per_slot);
+    const NodeShares& nodes = nodes_at_element_[element];
     if (nodes.count == 0) continue;
     for (int k = 0; k < nodes.count; ++k) row.push_back({nodes.node[k], share.weight * nodes.weight[k]});
     row.push_back({node_count + patch, -share.weight});

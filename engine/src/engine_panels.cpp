@@ -71,7 +71,7 @@ void Engine::balance_panels(SparseRows& patch_sky) const {
     const AngleBins& bins = panels_->frame(panel).bins;
     const float area = faces_.faces[static_cast<std::size_t>(panel.face)].area;
     for (int bin = 0; bin < bins.count(); ++bin) {
-      const auto number = static_cast<std::size_t>(panel.first_bin + bin);
+      const std::size_t number = static_cast<std::size_t>(panel.first_bin) + static_cast<std::size_t>(bin);
       const double sent = static_cast<double>(area * bins.projected_solid_angle(bin));
       if (arrived[number] > 0)
         scale[number] = static_cast<float>(std::clamp(sent / arrived[number], 1 / kMostScale, kMostScale));
@@ -154,7 +154,7 @@ void Engine::find_shafts(Condition& condition, std::vector<glm::vec3>& residual)
       if (panels[k].opening != rest.opening) continue;
       const double share = sunlit_share(faces_.faces[static_cast<std::size_t>(panels[k].face)], pieces[k]);
       for (int bin = 0; bin < bins; ++bin)
-        residual[static_cast<std::size_t>(panels[k].first_bin + bin)] +=
+        residual[static_cast<std::size_t>(panels[k].first_bin) + static_cast<std::size_t>(bin)] +=
             static_cast<float>(share) * rest.radiance[static_cast<std::size_t>(bin)];
     }
   }

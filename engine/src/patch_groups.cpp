@@ -94,6 +94,7 @@ std::vector<Share> PatchGroups::grouped(const std::vector<Share>& row, const std
                                         float tolerance) const {
   if (lights.empty()) return row;
   std::vector<float> received;
+  received.reserve(lights.size());
   for (const TypicalLight& light : lights) received.push_back(light.received_by(row));
   std::vector<Share> result = grouped_within(row, lights, received, tolerance);
   const float sum = lights.front().received_by(result);
@@ -129,9 +130,9 @@ std::vector<Share> PatchGroups::grouped_within(const std::vector<Share>& row, co
   for (const Share& share : row) add(parent_of_patch_[share.index], share.weight);
   for (std::size_t word = scratch.is_met.size(); word-- > 0;)
     while (is_met[word] != 0) {  // adding a group to its parent adds to a lower bit, or to a word further on
-      const std::size_t bit = kBits - 1 - static_cast<std::size_t>(std::countl_zero(is_met[word]));
-      is_met[word] &= ~(std::uint64_t{1} << bit);
-      met.push_back(static_cast<int>(word * kBits + bit));
+      const std::uint64_t bit = std::bit_floor(is_met[word]);
+      is_met[word] ^= bit;
+      met.push_back(static_cast<int>(word * kBits) + std::countr_zero(bit));
       add(groups_[met.back()].parent, weight[met.back()]);
     }
   const auto is_fine = [&](int g) {

@@ -1,5 +1,6 @@
 // How points see far patches: by their middles, and by their elements where something may hide a part of them.
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numbers>
 
@@ -160,6 +161,7 @@ void PointLinks::ElementViews::ask(const std::vector<int>& points) {
   for (const int point : not_known(points)) answers.push_back({point});
   const std::vector<int>& elements = view_.exposed.elements;
   std::vector<glm::vec3> places;
+  places.reserve(elements.size());
   for (const int element : elements) places.emplace_back(link_.element[static_cast<std::size_t>(element)]);
   MayBeGlazed may_glaze(links_, places);
   std::vector<Ray> segments;
@@ -258,7 +260,7 @@ void PointLinks::weigh_far(Link& link, int slot) const {
   link.weight_unit = most / std::numeric_limits<std::uint16_t>::max();
   link.weight.resize(weight.size());
   for (std::size_t k = 0; k < weight.size(); ++k)
-    link.weight[k] = static_cast<std::uint16_t>(weight[k] / link.weight_unit + 0.5f);
+    link.weight[k] = static_cast<std::uint16_t>(std::floor(weight[k] / link.weight_unit + 0.5f));
 }
 
 }  // namespace transom

@@ -22,6 +22,10 @@ constexpr double kEdgeOnCosine = 1e-7;
 
 constexpr int kColumns = 64;  // along the light, each way, in which shaded points are looked up
 
+std::size_t column_number(int x, int y) {
+  return static_cast<std::size_t>(y) * kColumns + static_cast<std::size_t>(x);
+}
+
 /// Sets that can be merged; the representative of each is its smallest member.
 class DisjointSets {
  public:
@@ -159,7 +163,7 @@ ShadedPoints::ShadedPoints(glm::dvec3 direction_to_sun, std::span<const std::pai
     const Columns reached = columns(glm::dvec2(low), glm::dvec2(high));
     for (int y = reached.first.y; y < reached.last.y; ++y)
       for (int x = reached.first.x; x < reached.last.x; ++x) {
-        double& farthest = farthest_[static_cast<std::size_t>(y * kColumns + x)];
+        double& farthest = farthest_[column_number(x, y)];
         farthest = std::min(farthest, low.z);
       }
   }
@@ -180,7 +184,7 @@ bool ShadedPoints::may_be_shaded_by(const glm::vec3& a, const glm::vec3& b, cons
   const Columns reached = columns(glm::dvec2(low), glm::dvec2(high));
   for (int y = reached.first.y; y < reached.last.y; ++y)
     for (int x = reached.first.x; x < reached.last.x; ++x)
-      if (farthest_[static_cast<std::size_t>(y * kColumns + x)] <= high.z) return true;
+      if (farthest_[column_number(x, y)] <= high.z) return true;
   return false;
 }
 

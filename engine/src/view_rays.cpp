@@ -107,8 +107,10 @@ void PixelParts::find_whole_places() {
     const std::size_t part = part_at_[static_cast<std::size_t>(first)];
     bool is_whole = true;
     for (int j = 0; j < kFiner; ++j)
-      for (int i = 0; i < kFiner; ++i)
-        is_whole &= part_at_[static_cast<std::size_t>(first + j * kFiner * s_ + i)] == part;
+      for (int i = 0; i < kFiner; ++i) {
+        const int sample = first + j * kFiner * s_ + i;
+        is_whole &= part_at_[static_cast<std::size_t>(sample)] == part;
+      }
     whole_.push_back(is_whole ? part : kNone);
   }
 }
