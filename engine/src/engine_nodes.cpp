@@ -363,9 +363,9 @@ void Engine::gather_nodes(Known& known) {
   resolve_near_light(trial);
   const std::vector<float> settled = find_rounds(trial);
   if (!settled.empty()) {
-    send_unevenly(settled);
+    const std::vector<float> seen_from_afar = send_unevenly(settled);
     parallel_indices(trial.rows.size(), kGrain,
-                     [&](std::size_t i) { see_from_afar(trial.rows[i].near, trial.patches[i]); });
+                     [&](std::size_t i) { see_from_afar(seen_from_afar, trial.rows[i].near, trial.patches[i]); });
   }
   interreflection_->prepare(smooth_lights_);
   keep_node_rows(trial, known);

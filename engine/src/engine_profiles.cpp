@@ -58,15 +58,15 @@ std::vector<Share> Engine::seen_of(std::size_t patch, const std::vector<float>& 
 }
 
 // Lets patches send as the shape of light under an even sky has it, or of lamps. A patch of which a part is hidden, as
-// behind books on a shelf, sends less than its mean from there, and more from what the room sees of it. From afar all
-// see about the same of a patch: for nodes that is one number.
-void Engine::send_unevenly(const std::vector<float>& node_irradiance) {
+// behind books on a shelf, sends less than its mean from there, and more from what the room sees of it. Returns what is
+// seen of each patch from afar, relative to its mean: there all see about the same.
+std::vector<float> Engine::send_unevenly(const std::vector<float>& node_irradiance) {
   const std::size_t n = slot_of_patch_.size();
   const std::vector<float> profiles = element_profiles(node_irradiance);
   std::vector<std::vector<Share>> seen(n);
   parallel_indices(n, kGrain, [&](std::size_t p) { seen[p] = seen_of(p, profiles); });
   SparseRows sent = sent_unevenly(*form_factors_, seen);
-  seen_from_afar_.assign(n, 1.f);
+  std::vector<float> seen_from_afar(n, 1.f);
   parallel_indices(n, kGrain, [&](std::size_t p) {
     const glm::vec3 middle = mesh_->middle_of(slot_of_patch_[p]).position;
     const float near = gatherer_->near_distance(slot_of_patch_[p]);
@@ -77,25 +77,25 @@ void Engine::send_unevenly(const std::vector<float>& node_irradiance) {
       even += form_factors_->entries[k].weight;
       uneven += sent.entries[k].weight;
     }
-    if (even > 0) seen_from_afar_[p] = uneven / even;
+    if (even > 0) seen_from_afar[p] = uneven / even;
   });
   interreflection_->send(std::move(sent));
   find_smooth_lights();
+  return seen_from_afar;
 }
 
 // What a node sees of patches beyond the near elements, whose own light it will take, as these are seen from afar.
-void Engine::see_from_afar(const std::vector<Share>& near, std::vector<Share>& patches) const {
-  thread_local std::vector<Share> near_patches;
-  near_patches = near;
-  for (Share& share : near_patches) share.index = patch_of_slot_[share.index / mesh_->elements_per_slot()];
-  std::erase_if(near_patches, [](const Share& share) { return share.index < 0; });
-  merge_shares(near_patches);
+void Engine::see_from_afar(const std::vector<float>& seen_from_afar, const std::vector<Share>& near,
+                           std::vector<Share>& patches) const {
+  std::vector<Share> near_slots = near;
+  for (Share& share : near_slots) share.index /= mesh_->elements_per_slot();
+  const std::vector<Share> near_patches = to_patches(near_slots);
   auto close_by = near_patches.begin();
   for (Share& share : patches) {
     float near_weight = 0;
     while (close_by != near_patches.end() && close_by->index < share.index) ++close_by;
     if (close_by != near_patches.end() && close_by->index == share.index) near_weight = close_by->weight;
-    share.weight = near_weight + std::max(0.f, share.weight - near_weight) * seen_from_afar_[share.index];
+    share.weight = near_weight + std::max(0.f, share.weight - near_weight) * seen_from_afar[share.index];
   }
 }
 

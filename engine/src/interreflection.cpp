@@ -3,7 +3,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 #include <map>
 #include <stdexcept>
 #include <tuple>
@@ -71,10 +70,11 @@ void Interreflection::send(SparseRows sent) {
 
 // Makes the exchange of what patches receive of each other and through openings.
 void Interreflection::receive(const SparseRows& received) {
+  const SparseRows* const parts[]{&received, &through_};
   SparseRows all;
   all.entries.reserve(received.entries.size() + through_.entries.size());
   for (std::size_t i = 0; i < areas_.size(); ++i) {
-    for (const SparseRows* rows : std::initializer_list<const SparseRows*>{&received, &through_})
+    for (const SparseRows* rows : parts)
       all.entries.insert(all.entries.end(), rows->entries.begin() + static_cast<std::ptrdiff_t>(rows->begin[i]),
                          rows->entries.begin() + static_cast<std::ptrdiff_t>(rows->begin[i + 1]));
     all.begin.push_back(all.entries.size());

@@ -39,9 +39,9 @@ glm::vec3 CameraRays::direction(glm::vec2 pixel) const {
 
 // Channel by channel, so that the compiler takes several places at once.
 void CameraRays::directions(glm::vec2 corner, std::span<const glm::vec2> places, float* x, float* y, float* z) const {
+  if (places.empty()) return;
   const glm::dvec3 forward = forward_, right = right_, down = down_;
   const double width = width_, height = height_;
-  if (places.empty()) return;
   const float* place = &places[0].x;
   for (std::size_t i = 0; i < places.size(); ++i) {
     const double across = 2.0 * static_cast<double>(corner.x + place[2 * i]) / width - 1.0,

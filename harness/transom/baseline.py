@@ -11,7 +11,7 @@ import hashlib
 import json
 import math
 import subprocess
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,7 +23,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from transom.errors import InputError, invalid_field
 from transom.files import write_atomic
 from transom.judge import GOOD_ENOUGH_SHARE, Subject, ToleranceFile, coverage_factor
-from transom.measures import UP_CLOSE, Measure
+from transom.measures import SEEN, TRIANGLE, UP_CLOSE, Measure
 from transom.provenance import current_provenance
 
 BASELINE_FORMAT = 1
@@ -239,6 +239,7 @@ def drifts(blessed: BlessedCase, now: Measured, *, fresh_seed: bool) -> list[Dri
     """
     measures = {measure.name: measure for measure in now.by_seed[0]}
     known = {(entry.quantity, entry.category, entry.place): entry for entry in blessed.measures}
+    seen = {entry.place for entry in blessed.measures if entry.category == SEEN}
     place = (now.case, now.scene, now.view, now.condition, now.method)
     rows = [
         Drift(*place, "broken_claims", "inputs", f"{name} is as it was", None, None, 1.0, 0.0, 0, None)
@@ -250,12 +251,8 @@ def drifts(blessed: BlessedCase, now: Measured, *, fresh_seed: bool) -> list[Dri
         if before is None or after is None:
             found = (before.value if before else None, after.value if after else None)
             rows.append(Drift(*place, *name, *found, math.nan, 0.0, 0, None))
-        elif before.category == UP_CLOSE and before.spread > CHANCE_SPREAD * abs(before.mean):
-            continue  # in the sun or in the dark by whether a ray outdoors has found it: no room has light from it
-        elif fresh_seed and before.category == UP_CLOSE and after.value < CHANCE_SPREAD * before.value:
-            continue  # the same, lit by every blessed seed: few seeds do not show that chance has lit it
-        elif fresh_seed and before.category == UP_CLOSE and before.spread == 0:
-            continue  # a buried face, dark by every blessed seed: one of its few rays by chance would light it
+        elif before.category == UP_CLOSE and _hangs_on_chance(before, after, seen, fresh_seed=fresh_seed):
+            continue
         elif fresh_seed:
             rows.append(_drift_of_mean(place, before, after, blessed.seeds))
         else:
@@ -264,6 +261,18 @@ def drifts(blessed: BlessedCase, now: Measured, *, fresh_seed: bool) -> list[Dri
             share = abs(difference) / spread if spread > 0 else None
             rows.append(Drift(*place, *name, before.value, after.value, difference, 0.0, 0, share))
     return rows
+
+
+def _hangs_on_chance(before: BlessedMeasure, after: Measure, seen: Collection[str], *, fresh_seed: bool) -> bool:
+    """Whether a triangle's light is a matter of few rays. seen: the faces that a room sees."""
+    if before.spread > CHANCE_SPREAD * abs(before.mean):
+        return True  # in the sun or in the dark by whether a ray outdoors has found it: no room has light from it
+    if not fresh_seed:
+        return False
+    if before.spread == 0:
+        return True  # a buried face, dark by every blessed seed: one of its few rays by chance would light it
+    # Outdoors, found by every blessed seed and not by this one.
+    return before.place.partition(TRIANGLE)[0] not in seen and after.value < CHANCE_SPREAD * before.value
 
 
 def _drift_of_mean(place: tuple[str, str, str, str, str], before: BlessedMeasure, after: Measure, seeds: int) -> Drift:

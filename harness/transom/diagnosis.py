@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 from transom.baseline import Drift
-from transom.measures import UP_CLOSE
+from transom.measures import SEEN, UP_CLOSE
 
 LIGHT_CATEGORIES = ("sky", "sky in blocks", "indirect", "indirect in blocks", "emitted", "emitted in blocks", "sun")
 
@@ -53,7 +53,7 @@ def _question(failed: Sequence[Drift]) -> list[str]:
 
 def _geometry(failed: Sequence[Drift], rows: Sequence[Drift]) -> list[str]:
     counted = [row for row in failed if row.category == "geometry"]
-    seen = _largest([row for row in failed if row.category == "geometry seen"])
+    seen = _largest([row for row in failed if row.category == SEEN])
     found = [f"Geometry: {row.place} {_number(row.before)} → {_number(row.now)} ({row.scene})." for row in counted]
     near = [row for row in rows if row.category == UP_CLOSE]
     changed = [row for row in near if not abs(row.difference) <= LOST_PERCENT]

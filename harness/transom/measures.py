@@ -40,8 +40,13 @@ PROBE_PIXELS = 96
 LEAST_FACE_PIXELS = 25
 """Faces that all probes together see with fewer pixels are not counted one by one."""
 
+SEEN = "geometry seen"
+"""Category of how much of a face probes in the rooms see."""
+
+TRIANGLE = ", triangle "
 UP_CLOSE = "faces up close"
-"""Category of the light of each triangle, measured so near that nothing else is seen."""
+"""Category of the light of each triangle, measured so near that nothing else is seen; its places are a face's words,
+TRIANGLE and a number."""
 
 UP_CLOSE_M = 1e-3
 UP_CLOSE_RAYS = 64
@@ -136,9 +141,7 @@ def geometry_measures(scene: Scene) -> Iterator[Measure]:
     counts = _seen_pixels(scene)
     for face in np.flatnonzero(counts >= LEAST_FACE_PIXELS):
         count = float(counts[face])
-        yield Measure(
-            "broken_claims", "geometry seen", face_words(scene, int(face)), count, 1 / (FACE_LOSS_SHARE * count)
-        )
+        yield Measure("broken_claims", SEEN, face_words(scene, int(face)), count, 1 / (FACE_LOSS_SHARE * count))
 
 
 def triangle_points(scene: Scene) -> SensorTable:
@@ -152,7 +155,7 @@ def triangle_points(scene: Scene) -> SensorTable:
             length = float(np.linalg.norm(normal))
             if length / 2 < LEAST_TRIANGLE_M2:
                 continue
-            names.append(f"{face_words(scene, face)}, triangle {index + 1}")
+            names.append(f"{face_words(scene, face)}{TRIANGLE}{index + 1}")
             points.append((a + b + c) / 3 + UP_CLOSE_M * normal / length)
             normals.append(-normal / length)
     # The last bits of linear algebra hang on the processor: without them, the question is the same on every machine.

@@ -117,7 +117,7 @@ TEST(Nodes, LightDecaysUnderALowSlabAsItDoesBetweenFinerPatches) {
 }
 
 TEST(Nodes, BelowASlabTakeWhatItSendsAndNotWhatItsPatchesDo) {
-  // The slab's lower side sees the floor beside it, or below it: its patches are an eighth too bright in the middle.
+  // Gathered from patches alone, the middle of the slab's lower side has 15 % too much, which the floor would take on.
   SolveOptions precise = options(0.06f);
   precise.node_samples = {4096, 256};
   const Engine engine(room_with_slab(), tregenza(), precise);

@@ -14,7 +14,7 @@ from transom.baseline import Baseline, Drift, Measured, bless, drifts, read_base
 from transom.diagnosis import diagnose
 from transom.errors import InputError
 from transom.judge import Outcome, judge, read_tolerances
-from transom.measures import UP_CLOSE, Measure, relative
+from transom.measures import SEEN, TRIANGLE, UP_CLOSE, Measure, relative
 
 TOLERANCES = Path(__file__).parents[2] / "scenes" / "tolerances.toml"
 REASON = "a test that says why"
@@ -168,3 +168,14 @@ def test_faces_that_some_seeds_alone_find_are_not_compared(tmp_path: Path) -> No
     now = [relative(UP_CLOSE, "frame", 53486.0, 9.0), relative(UP_CLOSE, "sill", 1200.0, 900.0)]
     assert [row.place for row in failed(compared(baseline, now))] == ["sill"]
     assert [row.place for row in compared(baseline, now, fresh_seed=True)] == ["sill"]
+
+
+def test_faces_that_go_dark_with_a_fresh_seed_are_told_where_a_room_sees_them(tmp_path: Path) -> None:
+    """The outer side of a frame, found in the sun by sixteen seeds and not by the next; a wall is no such one."""
+    places = [f"{face}{TRIANGLE}1" for face in ("frame", "wall")]
+    by_seed = [[relative(UP_CLOSE, place, value, 900.0) for place in places] for value in (905.0, 890.0, *[900.0] * 14)]
+    wall = Measure("broken_claims", SEEN, "wall", 400.0, 0.05)
+    baseline = blessed(tmp_path, *([*seeded, wall] for seeded in by_seed))
+    now = [*(relative(UP_CLOSE, place, 7.0, 900.0) for place in places), wall]
+    assert [row.place for row in failed(compared(baseline, now, fresh_seed=True))] == [places[1]]
+    assert [row.place for row in failed(compared(baseline, now))] == places

@@ -39,7 +39,8 @@ SEEDS = 4
 class PlantedEngine(EngineRenderer):
     """The engine with a fault: in the scene or the condition that it is given, or in what its answers lack.
 
-    lost_indirect: share of the indirect light of pictures; lost_flux: of all flux, in the energy balance.
+    lost_indirect: share of the indirect light of pictures; lost_flux: of all flux, in the energy balance; lost_sweeps:
+    of interreflection.
     """
 
     def __init__(
@@ -49,11 +50,12 @@ class PlantedEngine(EngineRenderer):
         condition: Callable[[Condition], Condition] = lambda condition: condition,
         lost_indirect: float = 0.0,
         lost_flux: float = 0.0,
+        lost_sweeps: int = 0,
     ) -> None:
         super().__init__()
         self.version = f"planted {name}"
         self._scene, self._condition = scene, condition
-        self._lost_indirect, self._lost_flux = lost_indirect, lost_flux
+        self._lost_indirect, self._lost_flux, self._lost_sweeps = lost_indirect, lost_flux, lost_sweeps
 
     def render(
         self,
@@ -78,8 +80,12 @@ class PlantedEngine(EngineRenderer):
         progress: Progress | None = None,
     ) -> SensorResult:
         whole = super().illuminance(self._scene(scene), self._condition(condition), points, normals, options, progress)
-        balance = whole.facts["energy_imbalance"] - self._lost_flux
-        return dataclasses.replace(whole, facts={**whole.facts, "energy_imbalance": balance})
+        facts = {
+            **whole.facts,
+            "energy_imbalance": whole.facts["energy_imbalance"] - self._lost_flux,
+            "sweeps": whole.facts["sweeps"] - self._lost_sweeps,
+        }
+        return dataclasses.replace(whole, facts=facts)
 
 
 @pytest.fixture(scope="module")
@@ -182,9 +188,10 @@ def test_turned_sky_is_named(monkeypatch: pytest.MonkeyPatch, folder: Path, base
 def test_bounces_that_stop_early_are_named(monkeypatch: pytest.MonkeyPatch, folder: Path, baseline: Baseline) -> None:
     assert baseline
     # No setting of the engine does so: what a first cycle leaves is carried to its end before the engine stops.
-    found, words = checked(monkeypatch, folder, PlantedEngine("bounces", lost_indirect=0.025, lost_flux=0.01))
-    assert {"indirect", "energy"} <= found and not found & {"sky", "sun", "sun shadow", "plan"}
-    assert "Flux is lost: the transfer is too weak, or the bounces stop early" in words
+    stops_early = PlantedEngine("bounces", lost_indirect=0.025, lost_flux=0.01, lost_sweeps=1)
+    found, words = checked(monkeypatch, folder, stops_early)
+    assert {"indirect", "energy", "plan"} <= found and not found & {"sky", "sun", "sun shadow"}
+    assert "the bounces stop early" in words
 
 
 def test_moved_shadow_is_named_in_millimetres(

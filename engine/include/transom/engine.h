@@ -211,8 +211,9 @@ class Engine {
   float sent_of_trial(const TrialLight& light, std::size_t node, float irradiance) const;
   std::vector<float> element_profiles(const std::vector<float>& node_irradiance) const;
   std::vector<Share> seen_of(std::size_t patch, const std::vector<float>& profiles) const;
-  void send_unevenly(const std::vector<float>& node_irradiance);
-  void see_from_afar(const std::vector<Share>& near, std::vector<Share>& patches) const;
+  std::vector<float> send_unevenly(const std::vector<float>& node_irradiance);
+  void see_from_afar(const std::vector<float>& seen_from_afar, const std::vector<Share>& near,
+                     std::vector<Share>& patches) const;
   bool is_worth_a_look(const NodeTrial& trial, int part, int level, float tolerance) const;
   bool is_to_be_divided(const NodeTrial& trial, int part, int level, float tolerance) const;
   void gather_nodes(Known& known);
@@ -285,7 +286,6 @@ class Engine {
   std::unique_ptr<Interreflection> interreflection_;
   std::vector<std::vector<float>> smooth_lights_;  // radiosity of patches: first what the sky makes, if it is seen
   bool has_sky_ = false;
-  std::vector<float> seen_from_afar_;  // by patch: of its radiosity, relative to the mean
 
   // Panels: products by opening; what arrives at each incident bin from the sky, and from elements or patches outdoors.
   std::vector<Product> products_;
