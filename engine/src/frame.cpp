@@ -10,7 +10,8 @@
 namespace transom {
 namespace {
 
-constexpr std::size_t kBlock = 256;  // pixels at once
+constexpr std::size_t kBlock = 256;   // pixels at once
+constexpr std::size_t kGrain = 2048;  // places
 
 // By face * 2 + side: whether beams are known to reach all of it that takes part through openings alone.
 std::vector<char> enclosed_surfaces(const Engine& engine) {
@@ -33,14 +34,14 @@ std::vector<glm::vec4> shown_radiance(const Engine& engine, const Lighting& ligh
   std::vector<glm::vec4> sky, indirect;
   engine.shown_radiance(lighting, sky, indirect);
   if (!has_components) {
-    for (std::size_t i = 0; i < sky.size(); ++i) sky[i] += indirect[i];
+    parallel_indices(sky.size(), kGrain, [&](std::size_t i) { sky[i] += indirect[i]; });
     return sky;
   }
   std::vector<glm::vec4> both(2 * sky.size());
-  for (std::size_t i = 0; i < sky.size(); ++i) {
+  parallel_indices(sky.size(), kGrain, [&](std::size_t i) {
     both[2 * i] = sky[i];
     both[2 * i + 1] = indirect[i];
-  }
+  });
   return both;
 }
 

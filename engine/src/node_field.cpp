@@ -84,6 +84,7 @@ int NodeField::node_at(int surface, glm::vec2 st) {
     const glm::vec3 normal = mesh_.faces().faces[face].shading_normal(st);
     nodes_.push_back({mesh_.lifted_position(face, side, st), side == 0 ? normal : -normal});
     surface_of_node_.push_back(surface);
+    parameters_of_node_.push_back(st);
   }
   return entry->second;
 }
@@ -271,6 +272,7 @@ NodeShares NodeField::interpolate(int face, Side side, glm::vec2 st, glm::vec3 l
     own = own_coordinates(parts_[index]);
   }
   const Part& part = parts_[index];
+  if (part.centre >= 0) return between_midpoints(part, own);
   const bool has_middle = part.middle_node >= 0 && node_is_exposed_[part.middle_node];
   NodeShares shares = has_middle ? between_middle_and_corners(part, own) : between_corners(part, own);
   if (!part.is_split || keep_visible(lifted_point, shares)) return shares;

@@ -40,8 +40,8 @@ struct SolveOptions {
   float outdoor_edge_m = 0;       ///< of a patch outdoors, if longer; 0: so that these are not too many
   int target_patch_count = 3000;  ///< sides of cells that take part in the exchange of light, about
   int elements_per_edge = 4;      ///< a patch has the square of it
-  GatherSamples patch_samples{512, 128};
-  GatherSamples node_samples{1024, 256};
+  GatherSamples patch_samples{256, 128};
+  GatherSamples node_samples{1024, 384};
   int panel_rays = 256;          ///< outwards from a panel, for each incident bin
   float node_tolerance = 0.06f;  ///< relative error of interpolated light from which on nodes are added; infinity: none
   double tolerance = 2.5e-4;     ///< flux in flight at which interreflection stops, relative
@@ -141,7 +141,7 @@ class Engine {
   /// `shown_radiance`. Empty where the side takes no part.
   NodeShares shown_at(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const;
 
-  /// Radiance reflected by every node, then by every patch, of the light of sky and of surfaces [cd/m²].
+  /// Radiance reflected at every node and midpoint, then by every patch, of the light of sky and of surfaces [cd/m²].
   void shown_radiance(const Lighting& lighting, std::vector<glm::vec4>& sky, std::vector<glm::vec4>& indirect) const;
 
   /// Whether a slot takes part, and whether beams are then known to reach it through openings alone.

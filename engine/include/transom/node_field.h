@@ -8,13 +8,14 @@
 #include <unordered_map>
 #include <vector>
 
+#include "transom/compact_rows.h"
 #include "transom/light_mesh.h"
 #include "transom/ray_scene.h"
 
 namespace transom {
 
-/// Nodes around a point and their weights (sum 1; slightly negative beyond the outermost nodes of a face). count 0: no
-/// node can speak for the point.
+/// Nodes around a point, or midpoints, whose numbers follow those of the nodes; and their weights (sum 1; slightly
+/// negative beyond the outermost nodes of a face). count 0: no node can speak for the point.
 struct NodeShares {
   std::array<int, 4> node{};
   std::array<float, 4> weight{};
@@ -37,7 +38,7 @@ class BoxTree;
 /// a point asks which of them it sees, so that light does not leak through walls and partitions.
 ///
 /// Use: make it and say which nodes are exposed; then, as often as wanted, give parts a middle or divide them, and say
-/// the same of the new nodes.
+/// the same of the new nodes. In the end find midpoints, which follow how light bends from part to part.
 class NodeField {
  public:
   /// slots: the cells that need nodes. Each begins as one part. thin: width [m] below which light is taken not to
@@ -76,6 +77,16 @@ class NodeField {
   /// Divides a part: in four, or in two along its longer axis where that is much the longer one.
   void divide(int part);
 
+  /// Finds midpoints of parts that nothing divides: in the middle of their borders, and of themselves, unless a node is
+  /// there. Their light is that of up to four nodes along the border: the cubic through them, as far as under typical
+  /// lights these follow each other smoothly [as do essentially non-oscillatory schemes: Harten et al. 1987]. The
+  /// middle of a part blends its borders [Coons 1967]. lights: each by node, of those shown.
+  void find_midpoints(const std::vector<std::vector<float>>& lights);
+  /// Nodes and midpoints.
+  std::size_t place_count() const { return nodes_.size() + midpoints_.row_count(); }
+  /// Midpoints as weights of nodes, which add up to 1.
+  const ExactRows& midpoints() const { return midpoints_; }
+
   /// lifted_point: where the hit is, lifted off its surface.
   NodeShares interpolate(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const;
 
@@ -90,7 +101,12 @@ class NodeField {
     int first_child = -1;
     std::uint8_t division = 0;  // of u: bit 0; of v: bit 1
     char is_split = 0;
+    // Nodes or midpoints: of the border from corner k to the next; and of the part, -1 if it has none.
+    std::array<int, 4> between{};
+    int centre = -1;
   };
+  class Lines;
+  struct Border;
   std::vector<int> nearest_on_other_surfaces(int node, const std::vector<float>& reach, const BoxTree& tree) const;
   bool is_quad(const Part& part) const { return mesh_.grid(part.surface / 2).is_quad; }
   glm::vec2 size(const Part& part) const;
@@ -100,6 +116,11 @@ class NodeField {
   bool is_parted(const Part& part) const;
   NodeShares between_corners(const Part& part, glm::vec2 own) const;
   NodeShares between_middle_and_corners(const Part& part, glm::vec2 own) const;
+  NodeShares between_midpoints(const Part& part, glm::vec2 own) const;
+  std::array<Border, 4> borders(const Part& part) const;
+  std::vector<Share> midway(const Border& border, const Lines& lines,
+                            const std::vector<std::vector<float>>& lights) const;
+  bool is_open_between(int a, int b) const;
   bool keep_visible(glm::vec3 point, NodeShares& shares) const;
 
   const LightMesh& mesh_;
@@ -108,8 +129,10 @@ class NodeField {
   std::vector<Part> parts_;        // children of one part stand together
   std::vector<Node> nodes_;
   std::vector<int> surface_of_node_;
+  std::vector<glm::vec2> parameters_of_node_;
   std::vector<char> node_is_exposed_;
   std::vector<std::unordered_map<std::uint64_t, int>> node_of_place_;  // by surface
+  ExactRows midpoints_;
   float thin_;
 };
 
