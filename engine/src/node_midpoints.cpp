@@ -142,6 +142,23 @@ std::vector<Share> NodeField::midway(const Border& border, const Lines& lines,
   return row;
 }
 
+// The middle of a part from those of its borders: along each axis between the two that face each other, less what the
+// corners have been counted twice.
+std::vector<Share> NodeField::blended(const Part& part, const std::array<std::vector<Share>, 4>& borders) const {
+  const glm::vec2 span = part.high - part.low;
+  glm::vec2 middle(0.5f);  // between the corner nodes
+  for (int axis = 0; axis < 2; ++axis)
+    if (span[axis] > 0) middle[axis] = (0.5f - part.low[axis]) / span[axis];
+  const float across[4]{1 - middle.y, middle.x, middle.y, 1 - middle.x};  // weights of the borders
+  std::vector<Share> row;
+  for (std::size_t k = 0; k < 4; ++k) {
+    for (const Share& share : borders[k]) row.push_back({share.index, across[k] * share.weight});
+    row.push_back({part.corner_node[k], -across[k] * across[(k + 3) % 4]});
+  }
+  merge_shares(row);
+  return row;
+}
+
 void NodeField::find_midpoints(const std::vector<std::vector<float>>& lights) {
   std::vector<int> whole;
   std::vector<Border> borders;
@@ -168,26 +185,19 @@ void NodeField::find_midpoints(const std::vector<std::vector<float>>& lights) {
   for (const int p : whole) {
     Part& part = parts_[p];
     const std::array<Border, 4> own = this->borders(part);
-    const glm::vec2 span = part.high - part.low;
-    glm::vec2 middle(0.5f);  // between the corner nodes
-    for (int axis = 0; axis < 2; ++axis)
-      if (span[axis] > 0) middle[axis] = (0.5f - part.low[axis]) / span[axis];
-    const float across[4]{1 - middle.y, middle.x, middle.y, 1 - middle.x};  // weights of the borders
-    std::vector<Share> row;
+    std::array<std::vector<Share>, 4> row_of;
     for (std::size_t k = 0; k < 4; ++k) {
+      if (own[k].first == own[k].last) {  // of a thin part
+        part.between[k] = own[k].first;
+        row_of[k] = {{own[k].first, 1.f}};
+        continue;
+      }
       const auto border = std::lower_bound(borders.begin(), borders.end(), own[k]) - borders.begin();
-      const bool is_point = own[k].first == own[k].last;
-      part.between[k] = is_point ? own[k].first : number_of_border[border];
-      for (const Share& share : is_point ? std::vector<Share>{{own[k].first, 1}} : rows[border])
-        row.push_back({share.index, across[k] * share.weight});
-      row.push_back({part.corner_node[k], -across[k] * across[(k + 3) % 4]});
+      part.between[k] = number_of_border[border];
+      row_of[k] = rows[border];
     }
-    if (part.middle_node >= 0 && node_is_exposed_[part.middle_node]) {
-      part.centre = part.middle_node;
-    } else {
-      merge_shares(row);
-      part.centre = number(std::move(row));
-    }
+    const bool has_middle = part.middle_node >= 0 && node_is_exposed_[part.middle_node];
+    part.centre = has_middle ? part.middle_node : number(blended(part, row_of));
   }
   midpoints_ = ExactRows(SparseRows::of(midpoints));
 }

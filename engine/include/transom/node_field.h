@@ -120,6 +120,7 @@ class NodeField {
   std::array<Border, 4> borders(const Part& part) const;
   std::vector<Share> midway(const Border& border, const Lines& lines,
                             const std::vector<std::vector<float>>& lights) const;
+  std::vector<Share> blended(const Part& part, const std::array<std::vector<Share>, 4>& borders) const;
   bool is_open_between(int a, int b) const;
   bool keep_visible(glm::vec3 point, NodeShares& shares) const;
 
