@@ -271,7 +271,7 @@ NodeShares Engine::shown_at(int face, Side side, glm::vec2 st, glm::vec3 lifted_
   const int patch = patch_of_slot_[mesh_->slot_index(face, side, mesh_->grid(face).locate(st).cell)];
   if (patch < 0) return alone;
   alone.count = 1;
-  alone.node[0] = static_cast<int>(nodes_ ? nodes_->place_count() : 0) + patch;
+  alone.node[0] = static_cast<int>(nodes_ ? nodes_->count_with_midpoints() : 0) + patch;
   alone.weight[0] = 1;
   return alone;
 }
@@ -279,22 +279,23 @@ NodeShares Engine::shown_at(int face, Side side, glm::vec2 st, glm::vec3 lifted_
 void Engine::shown_radiance(const Lighting& lighting, std::vector<glm::vec4>& sky,
                             std::vector<glm::vec4>& indirect) const {
   const std::size_t node_count = nodes_ ? nodes_->nodes().size() : 0, patch_count = slot_of_patch_.size(),
-                    place_count = nodes_ ? nodes_->place_count() : 0;
-  sky.resize(place_count + patch_count);
-  indirect.resize(place_count + patch_count);
+                    first_patch = nodes_ ? nodes_->count_with_midpoints() : 0;
+  sky.resize(first_patch + patch_count);
+  indirect.resize(first_patch + patch_count);
   parallel_indices(node_count, 1024, [&](std::size_t i) {
     const glm::vec3 scale = reflectance(nodes_->surface(i) / 2, nodes_->surface(i) % 2) / kPi;
     sky[i] = glm::vec4(scale * lighting.node_sky[i], 0);
     indirect[i] = glm::vec4(scale * lighting.node_indirect[i], 0);
   });
-  parallel_indices(place_count - node_count, 1024, [&](std::size_t i) {
+  // A polynomial may fall below what it goes through, and light may not below 0.
+  parallel_indices(first_patch - node_count, 1024, [&](std::size_t i) {
     sky[node_count + i] = glm::max(nodes_->midpoints().dot(i, sky), 0.f);
     indirect[node_count + i] = glm::max(nodes_->midpoints().dot(i, indirect), 0.f);
   });
   parallel_indices(patch_count, 1024, [&](std::size_t p) {
     const glm::vec3 scale = patch_reflectance_[p] / kPi, from_sky = lighting.patch_sky[p];
-    sky[place_count + p] = glm::vec4(scale * from_sky, 0);
-    indirect[place_count + p] = glm::vec4(scale * (lighting.patch_irradiance[p] - from_sky - lighting.patch_sun[p]), 0);
+    sky[first_patch + p] = glm::vec4(scale * from_sky, 0);
+    indirect[first_patch + p] = glm::vec4(scale * (lighting.patch_irradiance[p] - from_sky - lighting.patch_sun[p]), 0);
   });
 }
 

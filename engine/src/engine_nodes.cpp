@@ -367,9 +367,10 @@ void Engine::gather_nodes(Known& known) {
     parallel_indices(trial.rows.size(), kGrain,
                      [&](std::size_t i) { see_from_afar(seen_from_afar, trial.rows[i].near, trial.patches[i]); });
   }
-  std::vector<std::vector<float>> lights;
-  for (TrialLight& light : trial.lights) lights.push_back(std::move(light.at_nodes));
-  nodes_->find_midpoints(lights);
+  // Only now: to what sends close by, nodes alone may speak for elements.
+  std::vector<LightAtNodes> lights;
+  for (const TrialLight& light : trial.lights) lights.push_back({light.at_nodes, light.dark});
+  nodes_->find_midpoints(shown_nodes_, lights);
   interreflection_->prepare(smooth_lights_);
   keep_node_rows(trial, known);
 }

@@ -11,7 +11,7 @@ namespace transom {
 namespace {
 
 constexpr std::size_t kBlock = 256;   // pixels at once
-constexpr std::size_t kGrain = 2048;  // places
+constexpr std::size_t kGrain = 2048;  // nodes, midpoints and patches
 
 // By face * 2 + side: whether beams are known to reach all of it that takes part through openings alone.
 std::vector<char> enclosed_surfaces(const Engine& engine) {

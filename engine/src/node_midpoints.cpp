@@ -11,9 +11,23 @@ namespace transom {
 namespace {
 
 constexpr float kSameLine = 3e-6f;  // of the parameters of a face: what rounding makes of one line at most
-constexpr float kNearest = 0.4f, kFarthest = 2.1f;  // lengths of a border beyond its ends at which a node goes with it
-constexpr float kAlike = 3;                         // ratio of slopes up to which light is smooth
-constexpr float kStraight = 0.02f;                  // of the light: bends that are none
+
+// Lengths of a border from its end to the next node beyond: of parts half as long, and twice, where one of them is at
+// the edge of the face and its nodes stand back from there.
+constexpr float kNearest = 0.4f, kFarthest = 2.4f;
+
+constexpr float kAlike = 3;         // ratio of slopes up to which light is smooth
+constexpr float kStraight = 0.02f;  // of the light: bends that are none
+
+// Whether light goes on over three nodes as it begins, but for what is not seen.
+bool is_smooth(const LightAtNodes& light, std::array<int, 3> node, std::array<float, 3> at) {
+  const auto [a, b, c] = std::array{light.irradiance[node[0]], light.irradiance[node[1]], light.irradiance[node[2]]};
+  const float slope = (b - a) / (at[1] - at[0]), slope_beyond = (c - b) / (at[2] - at[1]);
+  const float bend = std::abs(slope_beyond - slope) * std::abs(at[1] - at[0]);
+  if (bend <= kStraight * std::max({a, b, light.dark})) return true;
+  const auto [least, most] = std::minmax({std::abs(slope), std::abs(slope_beyond)});
+  return slope * slope_beyond > 0 && most < kAlike * least;
+}
 
 }  // namespace
 
@@ -23,6 +37,7 @@ struct NodeField::Border {
   int axis;         // of the parameters of the face
   float middle;     // parameter
 
+  bool is_point() const { return first == last; }  // of a thin part
   bool operator<(const Border& other) const { return std::pair(first, last) < std::pair(other.first, other.last); }
   bool operator==(const Border& other) const { return first == other.first && last == other.last; }
 };
@@ -39,17 +54,14 @@ class NodeField::Lines {
     const std::size_t line = lines.line_of_node[node];
     return {&lines.node[lines.begin[line]], lines.begin[line + 1] - lines.begin[line]};
   }
-  std::ptrdiff_t place(int node, int axis) const {
-    const Order& lines = lines_[axis];
-    return lines.place_of_node[node] - static_cast<std::ptrdiff_t>(lines.begin[lines.line_of_node[node]]);
-  }
+  std::ptrdiff_t position(int node, int axis) const { return lines_[axis].position_of_node[node]; }
 
  private:
   struct Order {
     std::vector<int> node;
     std::vector<std::size_t> begin;  // by line, in `node`
     std::vector<std::size_t> line_of_node;
-    std::vector<std::ptrdiff_t> place_of_node;  // in `node`
+    std::vector<std::ptrdiff_t> position_of_node;  // on its line
   };
   static Order lines_along(const NodeField& field, const std::vector<std::size_t>& nodes, int axis);
 
@@ -66,7 +78,7 @@ NodeField::Lines::Order NodeField::Lines::lines_along(const NodeField& field, co
   std::sort(lines.node.begin(), lines.node.end(),
             [&](int a, int b) { return std::pair(surface(a), across(a)) < std::pair(surface(b), across(b)); });
   lines.line_of_node.resize(field.nodes_.size());
-  lines.place_of_node.resize(field.nodes_.size());
+  lines.position_of_node.resize(field.nodes_.size());
   for (auto begin = lines.node.begin(); begin != lines.node.end();) {
     auto end = begin + 1;
     while (end != lines.node.end() && surface(*end) == surface(*begin) && across(*end) - across(end[-1]) < kSameLine)
@@ -74,7 +86,7 @@ NodeField::Lines::Order NodeField::Lines::lines_along(const NodeField& field, co
     std::sort(begin, end, [&](int a, int b) { return along(a) < along(b); });
     for (auto node = begin; node != end; ++node) {
       lines.line_of_node[*node] = lines.begin.size();
-      lines.place_of_node[*node] = node - lines.node.begin();
+      lines.position_of_node[*node] = node - begin;
     }
     lines.begin.push_back(static_cast<std::size_t>(begin - lines.node.begin()));
     begin = end;
@@ -100,51 +112,44 @@ bool NodeField::is_open_between(int a, int b) const {
 
 // The middle of a border: a node that is there, or weights of nodes along it.
 std::vector<Share> NodeField::midway(const Border& border, const Lines& lines,
-                                     const std::vector<std::vector<float>>& lights) const {
+                                     std::span<const LightAtNodes> lights) const {
   const std::span<const int> line = lines.of(border.first, border.axis);
-  const auto at = [&](std::ptrdiff_t place) { return parameters_of_node_[line[place]][border.axis]; };
-  const std::ptrdiff_t first = lines.place(border.first, border.axis), last = lines.place(border.last, border.axis),
+  const auto at = [&](std::ptrdiff_t i) { return parameters_of_node_[line[i]][border.axis]; };
+  const std::ptrdiff_t first = lines.position(border.first, border.axis),
+                       last = lines.position(border.last, border.axis),
                        count = static_cast<std::ptrdiff_t>(line.size());
-  for (std::ptrdiff_t place = first + 1; place < last; ++place)
-    if (std::abs(at(place) - border.middle) < kSameLine) return {{line[place], 1.f}};
+  for (std::ptrdiff_t i = first + 1; i < last; ++i)
+    if (std::abs(at(i) - border.middle) < kSameLine) return {{line[i], 1.f}};
   const float length = at(last) - at(first);
-  // The next node beyond an end, unless light bends sharply there under one of the lights.
-  const auto beyond = [&](std::ptrdiff_t end, std::ptrdiff_t step) -> std::ptrdiff_t {
-    std::ptrdiff_t place = end + step;
-    const auto distance = [&] { return std::abs(at(place) - at(end)); };
-    while (place >= 0 && place < count && distance() < kNearest * length) place += step;
-    if (place < 0 || place >= count || distance() > kFarthest * length || !is_open_between(line[end], line[place]))
-      return -1;
-    const bool is_smooth = std::all_of(lights.begin(), lights.end(), [&](const std::vector<float>& light) {
-      const float a = light[line[first]], b = light[line[last]];
-      const float slope = (b - a) / length,
-                  slope_beyond = (light[line[place]] - light[line[end]]) / (at(place) - at(end));
-      const float least = std::min(std::abs(slope), std::abs(slope_beyond)),
-                  most = std::max(std::abs(slope), std::abs(slope_beyond));
-      return std::abs(slope - slope_beyond) * length < kStraight * std::max(a, b) ||
-             (slope * slope_beyond > 0 && most < kAlike * least);
+  // Where the next node is beyond an end, seen from the other one; -1: none that light goes on to.
+  const auto beyond = [&](std::ptrdiff_t other_end, std::ptrdiff_t end) -> std::ptrdiff_t {
+    const std::ptrdiff_t step = end > other_end ? 1 : -1;
+    const auto distance = [&](std::ptrdiff_t i) { return std::abs(at(i) - at(end)); };
+    std::ptrdiff_t i = end + step;
+    while (i >= 0 && i < count && distance(i) < kNearest * length) i += step;
+    if (i < 0 || i >= count || distance(i) > kFarthest * length) return -1;
+    const bool goes_on = std::all_of(lights.begin(), lights.end(), [&](const LightAtNodes& light) {
+      return is_smooth(light, {line[other_end], line[end], line[i]}, {at(other_end), at(end), at(i)});
     });
-    return is_smooth ? place : -1;
+    return goes_on && is_open_between(line[end], line[i]) ? i : -1;
   };
-  std::ptrdiff_t places[4];
-  int used = 0;
-  if (const std::ptrdiff_t before = beyond(first, -1); before >= 0) places[used++] = before;
-  places[used++] = first;
-  places[used++] = last;
-  if (const std::ptrdiff_t after = beyond(last, 1); after >= 0) places[used++] = after;
+  std::vector<std::ptrdiff_t> used;
+  if (const std::ptrdiff_t before = beyond(last, first); before >= 0) used.push_back(before);
+  used.insert(used.end(), {first, last});
+  if (const std::ptrdiff_t after = beyond(first, last); after >= 0) used.push_back(after);
   std::vector<Share> row;
-  for (int i = 0; i < used; ++i) {
+  for (const std::ptrdiff_t i : used) {
     float weight = 1;  // of the polynomial through all of them [Lagrange]
-    for (int j = 0; j < used; ++j)
-      if (j != i) weight *= (border.middle - at(places[j])) / (at(places[i]) - at(places[j]));
-    row.push_back({line[places[i]], weight});
+    for (const std::ptrdiff_t k : used)
+      if (k != i) weight *= (border.middle - at(k)) / (at(i) - at(k));
+    row.push_back({line[i], weight});
   }
   return row;
 }
 
 // The middle of a part from those of its borders: along each axis between the two that face each other, less what the
 // corners have been counted twice.
-std::vector<Share> NodeField::blended(const Part& part, const std::array<std::vector<Share>, 4>& borders) const {
+std::vector<Share> NodeField::blended(const Part& part, const std::array<std::span<const Share>, 4>& borders) const {
   const glm::vec2 span = part.high - part.low;
   glm::vec2 middle(0.5f);  // between the corner nodes
   for (int axis = 0; axis < 2; ++axis)
@@ -159,7 +164,7 @@ std::vector<Share> NodeField::blended(const Part& part, const std::array<std::ve
   return row;
 }
 
-void NodeField::find_midpoints(const std::vector<std::vector<float>>& lights) {
+void NodeField::find_midpoints(const std::vector<std::size_t>& shown, std::span<const LightAtNodes> lights) {
   std::vector<int> whole;
   std::vector<Border> borders;
   for (int p = 0; p < part_count(); ++p) {
@@ -167,37 +172,39 @@ void NodeField::find_midpoints(const std::vector<std::vector<float>>& lights) {
     if (part.first_child >= 0 || part.is_split || !is_quad(part)) continue;
     whole.push_back(p);
     for (const Border& border : this->borders(part))
-      if (border.first != border.last) borders.push_back(border);
+      if (!border.is_point()) borders.push_back(border);
   }
   std::sort(borders.begin(), borders.end());
   borders.erase(std::unique(borders.begin(), borders.end()), borders.end());
-  const Lines lines(*this, shown_nodes());
+  const Lines lines(*this, shown);
   std::vector<std::vector<Share>> rows(borders.size());
   parallel_indices(borders.size(), 64, [&](std::size_t b) { rows[b] = midway(borders[b], lines, lights); });
   std::vector<std::vector<Share>> midpoints;
-  const auto number = [&](std::vector<Share> row) {
+  // The number of a midpoint, or of the node that it is.
+  const auto add = [&](std::vector<Share> row) {
     if (row.size() == 1) return row[0].index;
     midpoints.push_back(std::move(row));
     return static_cast<int>(nodes_.size() + midpoints.size()) - 1;
   };
   std::vector<int> number_of_border;
-  for (const std::vector<Share>& row : rows) number_of_border.push_back(number(row));
+  for (const std::vector<Share>& row : rows) number_of_border.push_back(add(row));
   for (const int p : whole) {
     Part& part = parts_[p];
     const std::array<Border, 4> own = this->borders(part);
-    std::array<std::vector<Share>, 4> row_of;
+    std::array<Share, 4> point;  // what the middle of a border without length is
+    std::array<std::span<const Share>, 4> row;
     for (std::size_t k = 0; k < 4; ++k) {
-      if (own[k].first == own[k].last) {  // of a thin part
+      if (own[k].is_point()) {
+        point[k] = {own[k].first, 1};
+        row[k] = {&point[k], 1};
         part.between[k] = own[k].first;
-        row_of[k] = {{own[k].first, 1.f}};
         continue;
       }
       const auto border = std::lower_bound(borders.begin(), borders.end(), own[k]) - borders.begin();
+      row[k] = rows[border];
       part.between[k] = number_of_border[border];
-      row_of[k] = rows[border];
     }
-    const bool has_middle = part.middle_node >= 0 && node_is_exposed_[part.middle_node];
-    part.centre = has_middle ? part.middle_node : number(blended(part, row_of));
+    part.centre = part.middle_node >= 0 ? part.middle_node : add(blended(part, row));
   }
   midpoints_ = ExactRows(SparseRows::of(midpoints));
 }

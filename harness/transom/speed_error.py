@@ -75,11 +75,14 @@ class Setting:
     quick: bool = False
 
 
+FEW_RAYS = {"patch_rays": 128, "patch_opening_rays": 64, "node_rays": 256, "node_opening_rays": 96}
+HALF_THE_RAYS = {"patch_rays": 128, "patch_opening_rays": 64, "node_rays": 512, "node_opening_rays": 192}
+
 SETTINGS: tuple[Setting, ...] = (
-    Setting(ENGINE, "300 patches, few rays", {"target_patch_count": 300, "patch_rays": 128, "node_rays": 256}, True),
+    Setting(ENGINE, "300 patches, few rays", {"target_patch_count": 300, **FEW_RAYS}, True),
     Setting(ENGINE, "1000 patches", {"target_patch_count": 1000}, True),
     Setting(ENGINE, DEFAULT_SETTING, {}, True),
-    Setting(ENGINE, "half the rays", {"patch_rays": 128, "node_rays": 512, "node_opening_rays": 192}),
+    Setting(ENGINE, "half the rays", HALF_THE_RAYS),
     Setting(ENGINE, "wider nodes", {"node_tolerance": 0.24}),
     Setting(ENGINE, "10000 patches", {"target_patch_count": 10000}),
     Setting("classic", "1000 patches", {"target_patch_count": 1000}),

@@ -46,6 +46,11 @@ void expect_equal_light(const Engine& edited, const Engine& fresh) {
   EXPECT_EQ(a->patch_irradiance, b->patch_irradiance);
   EXPECT_EQ(a->node_sky, b->node_sky);
   EXPECT_EQ(a->node_indirect, b->node_indirect);
+  std::vector<glm::vec4> sky_of_edited, indirect_of_edited, sky, indirect;
+  edited.shown_radiance(*a, sky_of_edited, indirect_of_edited);
+  fresh.shown_radiance(*b, sky, indirect);
+  EXPECT_EQ(sky_of_edited, sky);
+  EXPECT_EQ(indirect_of_edited, indirect);
 }
 
 // The options of a fresh solve whose patches are as long as those of an edit of `solved`.

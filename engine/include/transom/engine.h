@@ -137,8 +137,8 @@ class Engine {
     return nodes_ ? std::span<const Node>(nodes_->nodes()) : std::span<const Node>();
   }
 
-  /// What speaks for the light at a point of a face: nodes around it, or else its patch. Numbers are those of
-  /// `shown_radiance`. Empty where the side takes no part.
+  /// What speaks for the light at a point of a face: nodes and midpoints around it, or else its patch. Numbers are
+  /// those of `shown_radiance`. Empty where the side takes no part.
   NodeShares shown_at(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const;
 
   /// Radiance reflected at every node and midpoint, then by every patch, of the light of sky and of surfaces [cd/m²].

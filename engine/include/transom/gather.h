@@ -19,8 +19,8 @@ struct HemisphereTally;
 
 /// Numbers of samples for one receiver.
 struct GatherSamples {
-  int hemisphere = 1024;  ///< rays over the hemisphere
-  int openings = 256;     ///< rays towards the openings in all
+  int hemisphere = 0;  ///< rays over the hemisphere
+  int openings = 0;    ///< rays towards the openings in all
 
   bool operator==(const GatherSamples&) const = default;
 };

@@ -14,8 +14,8 @@
 
 namespace transom {
 
-/// Nodes around a point, or midpoints, whose numbers follow those of the nodes; and their weights (sum 1; slightly
-/// negative beyond the outermost nodes of a face). count 0: no node can speak for the point.
+/// Nodes around a point, or midpoints, whose numbers follow those of the nodes; and their weights (sum 1; negative
+/// beyond the outermost nodes of a face). count 0: no node can speak for the point.
 struct NodeShares {
   std::array<int, 4> node{};
   std::array<float, 4> weight{};
@@ -29,6 +29,12 @@ struct NodeNeighbours {
   std::span<const int> of(std::size_t i) const {
     return begin.empty() ? std::span<const int>() : std::span(node.data() + begin[i], begin[i + 1] - begin[i]);
   }
+};
+
+/// A light's irradiance by node, read at shown ones. Differences are relative to `dark` at least.
+struct LightAtNodes {
+  std::span<const float> irradiance;
+  float dark = 0;
 };
 
 class BoxTree;
@@ -78,16 +84,15 @@ class NodeField {
   void divide(int part);
 
   /// Finds midpoints of parts that nothing divides: in the middle of their borders, and of themselves, unless a node is
-  /// there. Their light is that of up to four nodes along the border: the cubic through them, as far as under typical
-  /// lights these follow each other smoothly [as do essentially non-oscillatory schemes: Harten et al. 1987]. The
-  /// middle of a part blends its borders [Coons 1967]. lights: each by node, of those shown.
-  void find_midpoints(const std::vector<std::vector<float>>& lights);
-  /// Nodes and midpoints.
-  std::size_t place_count() const { return nodes_.size() + midpoints_.row_count(); }
+  /// there. Light at the middle of a border is that of the polynomial through its ends and the next node beyond each,
+  /// as far as each of the typical lights goes on smoothly to there [as in essentially non-oscillatory schemes: Harten
+  /// et al. 1987]. The middle of a part blends its borders [Coons 1967]. shown: as `shown_nodes` has them.
+  void find_midpoints(const std::vector<std::size_t>& shown, std::span<const LightAtNodes> lights);
+  std::size_t count_with_midpoints() const { return nodes_.size() + midpoints_.row_count(); }
   /// Midpoints as weights of nodes, which add up to 1.
   const ExactRows& midpoints() const { return midpoints_; }
 
-  /// lifted_point: where the hit is, lifted off its surface.
+  /// Of nodes alone, until midpoints have been found. lifted_point: where the hit is, lifted off its surface.
   NodeShares interpolate(int face, Side side, glm::vec2 st, glm::vec3 lifted_point) const;
 
  private:
@@ -118,9 +123,8 @@ class NodeField {
   NodeShares between_middle_and_corners(const Part& part, glm::vec2 own) const;
   NodeShares between_midpoints(const Part& part, glm::vec2 own) const;
   std::array<Border, 4> borders(const Part& part) const;
-  std::vector<Share> midway(const Border& border, const Lines& lines,
-                            const std::vector<std::vector<float>>& lights) const;
-  std::vector<Share> blended(const Part& part, const std::array<std::vector<Share>, 4>& borders) const;
+  std::vector<Share> midway(const Border& border, const Lines& lines, std::span<const LightAtNodes> lights) const;
+  std::vector<Share> blended(const Part& part, const std::array<std::span<const Share>, 4>& borders) const;
   bool is_open_between(int a, int b) const;
   bool keep_visible(glm::vec3 point, NodeShares& shares) const;
 
