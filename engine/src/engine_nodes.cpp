@@ -20,15 +20,15 @@ constexpr int kLevels = 4;
 constexpr float kFinest = 0.13f;
 constexpr float kThin = 0.12f;        // of that edge: across less, light does not change
 constexpr float kLevelGrowth = 2;     // of the tolerance, from level to level: a smaller part is less of a picture
-constexpr float kSmallness = 0.45f;   // exponent of the same between parts of different area
+constexpr float kSmallness = 0.35f;   // exponent of the same between parts of different area
 constexpr int kBuriedLevels = 2;      // divisions of parts of which nothing can be said but that a solid ends there
 constexpr float kLargeForBuried = 3;  // and the leniency up to which they are
 
 // A part is looked at when light differs between its corners by more than these multiples of the tolerance.
 constexpr float kLookNear = 1.5f, kLookFar = 2, kLookSplit = 0.5f;
-constexpr float kSteep = 4;    // and is divided whatever its middle says: a step may be half up in the middle
+constexpr float kSteep = 6;    // and is divided whatever its middle says: a step may be half up in the middle
 constexpr float kSloping = 2;  // from which on the middle is to be right to this share of the tolerance:
-constexpr float kSlopingShare = 0.25f;
+constexpr float kSlopingShare = 0.35f;
 constexpr float kNear = 0.18f;  // length of a part against the distance of what it sees
 
 constexpr float kGrouping = 1.5e-4f;  // of what a node receives from patches: what a group of these may err by

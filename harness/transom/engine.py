@@ -58,7 +58,7 @@ class SolveOptions:
     maximum_edge_m: float = 0.0
     target_patch_count: int = 3000
     elements_per_edge: int = 4
-    patch_rays: int = 256
+    patch_rays: int = 512
     patch_opening_rays: int = 128
     node_rays: int = 1024
     node_opening_rays: int = 384

@@ -76,7 +76,7 @@ class Setting:
 
 
 FEW_RAYS = {"patch_rays": 128, "patch_opening_rays": 64, "node_rays": 256, "node_opening_rays": 96}
-HALF_THE_RAYS = {"patch_rays": 128, "patch_opening_rays": 64, "node_rays": 512, "node_opening_rays": 192}
+HALF_THE_RAYS = {"patch_rays": 256, "patch_opening_rays": 64, "node_rays": 512, "node_opening_rays": 192}
 
 SETTINGS: tuple[Setting, ...] = (
     Setting(ENGINE, "300 patches, few rays", {"target_patch_count": 300, **FEW_RAYS}, True),

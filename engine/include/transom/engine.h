@@ -40,7 +40,7 @@ struct SolveOptions {
   float outdoor_edge_m = 0;       ///< of a patch outdoors, if longer; 0: so that these are not too many
   int target_patch_count = 3000;  ///< sides of cells that take part in the exchange of light, about
   int elements_per_edge = 4;      ///< a patch has the square of it
-  GatherSamples patch_samples{256, 128};
+  GatherSamples patch_samples{512, 128};
   GatherSamples node_samples{1024, 384};
   int panel_rays = 256;          ///< outwards from a panel, for each incident bin
   float node_tolerance = 0.06f;  ///< relative error of interpolated light from which on nodes are added; infinity: none
