@@ -83,10 +83,11 @@ class NodeField {
   /// Divides a part: in four, or in two along its longer axis where that is much the longer one.
   void divide(int part);
 
-  /// Finds midpoints of parts that nothing divides: in the middle of their borders, and of themselves, unless a node is
-  /// there. Light at the middle of a border is that of the polynomial through its ends and the next node beyond each,
-  /// as far as each of the typical lights goes on smoothly to there [as in essentially non-oscillatory schemes: Harten
-  /// et al. 1987]. The middle of a part blends its borders [Coons 1967]. shown: as `shown_nodes` has them.
+  /// Finds midpoints of four-sided parts that nothing divides: in the middle of their borders, and of themselves,
+  /// unless a node is there. Light at the middle of a border is that of the polynomial through its ends and the next
+  /// node beyond each, as far as each of the typical lights goes on smoothly to there [as in essentially
+  /// non-oscillatory schemes: Harten et al. 1987]. The middle of a part blends its borders [Coons 1967]. shown: as
+  /// `shown_nodes` has them.
   void find_midpoints(const std::vector<std::size_t>& shown, std::span<const LightAtNodes> lights);
   std::size_t count_with_midpoints() const { return nodes_.size() + midpoints_.row_count(); }
   /// Midpoints as weights of nodes, which add up to 1.
