@@ -187,7 +187,9 @@ std::shared_ptr<const Lighting> Engine::relight(Condition condition, const Light
   std::vector<glm::vec3> first_reflection = node_always_;
   const auto find_first_reflection = [&] {
     const TracePhase phase(trace_, "first reflection");
-    links_->add_irradiance({lighting->bright_elements.data(), lighting->beam_bright_count}, first_reflection);
+    std::vector<glm::vec3> linked(shown_nodes_.size(), glm::vec3(0));
+    links_->add_irradiance({lighting->bright_elements.data(), lighting->beam_bright_count}, linked);
+    for (std::size_t k = 0; k < linked.size(); ++k) first_reflection[shown_nodes_[k]] += linked[k];
   };
   // A state on the way once most of the indirect light is there; later cycles change what an eye does not see.
   const auto after_cycle = [&](int cycle, const std::vector<glm::vec3>& irradiance) {

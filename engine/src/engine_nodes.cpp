@@ -406,12 +406,22 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
   node_rows_ = found;
 }
 
+// Only nodes that are shown are linked, by their places among these.
 void Engine::link_nodes(const Known& known) {
-  links_ = std::make_unique<PointLinks>(*mesh_, *rays_, nodes_->nodes(), nodes_->neighbours());
+  std::vector<Node> points;
+  points.reserve(shown_nodes_.size());
+  for (const std::size_t node : shown_nodes_) points.push_back(nodes_->nodes()[node]);
+  links_ = std::make_unique<PointLinks>(*mesh_, *rays_, points, nodes_->neighbours(shown_nodes_));
   PointLinks::Known known_links;
-  if (known.engine && known.engine->links_)
-    known_links = {known.engine->links_.get(), known.change.get(), known.node, known.has_same_nodes,
-                   known.has_openings};
+  if (known.engine && known.engine->links_) {
+    const std::vector<std::size_t>& shown_before = known.engine->shown_nodes_;
+    std::vector<int> place_before(known.engine->nodes_->nodes().size(), -1), point;
+    for (std::size_t k = 0; k < shown_before.size(); ++k) place_before[shown_before[k]] = static_cast<int>(k);
+    for (const std::size_t node : shown_nodes_)
+      point.push_back(known.node[node] < 0 ? -1 : place_before[known.node[node]]);
+    known_links = {known.engine->links_.get(), known.change.get(), std::move(point),
+                   known.has_same_nodes && shown_before == shown_nodes_, known.has_openings};
+  }
   links_->prepare(beam_slots(), known_links);
   facts_.link_bytes = links_->byte_count();
 }

@@ -112,7 +112,7 @@ PointLinks::KnownPoints::KnownPoints(const Known& known, const Link* link) : kno
 
 int PointLinks::KnownPoints::number(int point) const {
   const int known_point = link_ ? known_.point[static_cast<std::size_t>(point)] : -1;
-  if (known_point < 0 || !known_.links->gets_light(known_point)) return -1;
+  if (known_point < 0) return -1;
   return known_.has_same_glazing || !is_glazed(known_point) ? known_point : -1;
 }
 
@@ -210,7 +210,7 @@ PointLinks::MiddleView PointLinks::middle_view(int slot, Exposed exposed, const 
     if (any == kBehind) continue;
     for (std::size_t k = 0; k < kBlock && begin + k < point_count_; ++k) {
       const int point = static_cast<int>(begin + k);
-      if (place[k] != kBehind && gets_light(point)) (place[k] == kFar ? far_points : view.near_point).push_back(point);
+      if (place[k] != kBehind) (place[k] == kFar ? far_points : view.near_point).push_back(point);
     }
   }
   see_middle(view, far_points, KnownPoints(known, view.before.get()));

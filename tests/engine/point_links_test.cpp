@@ -199,18 +199,6 @@ TEST(PointLinks, APatchThatIsPartlyHiddenIsPartlySeen) {
   }
 }
 
-TEST(PointLinks, APointWithoutNeighboursGetsNoLight) {
-  LitFloor floor;
-  NodeNeighbours neighbours;
-  neighbours.begin.assign(floor.points.size() + 1, 1);
-  neighbours.begin[0] = 0;
-  neighbours.node = {0};  // the first alone is shown
-  PointLinks links(*floor.mesh, *floor.rays, floor.points, neighbours), all(*floor.mesh, *floor.rays, floor.points);
-  const std::vector<glm::vec3> some = floor.by_links(links), every = floor.by_links(all);
-  EXPECT_NEAR(some[0].x, every[0].x, 1e-4f * every[0].x);  // stored to 16 bits of the largest
-  for (std::size_t i = 1; i < some.size(); ++i) EXPECT_EQ(some[i], glm::vec3(0)) << i;
-}
-
 TEST(PointLinks, GlassTakesItsShare) {
   // What a link keeps of a transmittance is rounded to 1/255 of its root.
   LitFloor clear(false, 1.f), dark(false, 0.3f);

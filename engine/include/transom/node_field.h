@@ -22,7 +22,7 @@ struct NodeShares {
   int count = 0;
 };
 
-/// For each node those around it and itself; none for a node that is not exposed.
+/// For each of some nodes, by their places among these, those around it and itself.
 struct NodeNeighbours {
   std::vector<std::size_t> begin;  ///< in `node`; one more than nodes, or none
   std::vector<int> node;
@@ -66,11 +66,11 @@ class NodeField {
   /// Corners of a part: 4, or 3 on a triangle.
   int corner_count(int part) const { return is_quad(parts_[part]) ? 4 : 3; }
   const std::array<int, 4>& corners(int part) const { return parts_[part].corner_node; }
-  /// Exposed nodes that share a part which is not divided, and the nearest ones on other surfaces that are no farther
-  /// than such parts are long.
-  NodeNeighbours neighbours() const;
-  /// Those that some place is shown by: exposed ones, but for those of divided parts alone.
+  /// Those that some place is shown by: exposed ones, but for those of divided parts alone. Ascending.
   std::vector<std::size_t> shown_nodes() const;
+  /// Of shown nodes: those that share a part which is not divided, and the nearest ones on other surfaces that are no
+  /// farther than such parts are long.
+  NodeNeighbours neighbours(const std::vector<std::size_t>& shown) const;
   /// Lengths of a part along its two axes [m].
   glm::vec2 size(int part) const { return size(parts_[part]); }
 
@@ -113,7 +113,8 @@ class NodeField {
   };
   class Lines;
   struct Border;
-  std::vector<int> nearest_on_other_surfaces(int node, const std::vector<float>& reach, const BoxTree& tree) const;
+  std::vector<int> nearest_on_other_surfaces(std::size_t place, const std::vector<std::size_t>& shown,
+                                             const std::vector<float>& reach, const BoxTree& tree) const;
   bool is_quad(const Part& part) const { return mesh_.grid(part.surface / 2).is_quad; }
   glm::vec2 size(const Part& part) const;
   void add_part(int surface, glm::vec2 corner, glm::vec2 u, glm::vec2 v);

@@ -29,8 +29,8 @@ namespace transom {
 /// each element for itself, with its own weight.
 class PointLinks {
  public:
-  /// neighbours: of the points; one that has none, not even itself, gets no light. Left out: all get some, and a far
-  /// patch is seen as its middle is. memory: for what is kept [bytes].
+  /// neighbours: of the points, itself among them. Left out: a far patch is seen as its middle is. memory: for what is
+  /// kept [bytes].
   PointLinks(const LightMesh& mesh, const RayScene& rays, const std::vector<Node>& points,
              NodeNeighbours neighbours = {}, std::size_t memory = kMemory);
 
@@ -155,9 +155,6 @@ class PointLinks {
     std::size_t block_ = static_cast<std::size_t>(-1);
     bool answer_ = true;
   };
-  bool gets_light(int point) const {
-    return neighbours_.begin.empty() || !neighbours_.of(static_cast<std::size_t>(point)).empty();
-  }
   Exposed exposed_part(int slot) const;
   int group_of(int element) const { return std::min(element, element * kGroups / mesh_.elements_per_slot()); }
   std::vector<int> slots_beside(int slot) const;
