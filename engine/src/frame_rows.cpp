@@ -14,6 +14,10 @@ constexpr float kSameShare = 0.02f;          // of a beam, between neighbouring 
 constexpr float kSameCurve = 0.9f;           // cosine between normals of neighbouring pixels on one surface
 constexpr std::size_t kPixelsFollowed = 16;  // at once
 
+float mean_of(std::span<const float> shares) {
+  return std::accumulate(shares.begin(), shares.end(), 0.f) / static_cast<float>(shares.size());
+}
+
 // Whether a point is on the surface of another one, flat or curved.
 bool is_continued(const BeamPoint& a, const BeamPoint& b) {
   if (b.surface < 0 || glm::dot(a.normal, b.normal) < kSameCurve) return false;
@@ -59,8 +63,8 @@ void FrameRenderer::add_beam(const Drawing& drawing, std::size_t beam, int row, 
   add_to_panes(drawing, beam, row, scratch, sun);
 }
 
-// Pixels on one surface: one point speaks for them, unless neighbours are lit otherwise. Then all samples are tested on
-// its plane.
+// Pixels on one surface: one point speaks for them, unless neighbours are lit otherwise. Then samples are tested on its
+// plane.
 void FrameRenderer::add_to_pixels(const Drawing& drawing, std::size_t beam, int row, Scratch& scratch, glm::vec3* sun) {
   const ViewSamples& samples = *samples_;
   const SeenBeam& seen = drawing.beams[beam];
@@ -99,35 +103,43 @@ void FrameRenderer::add_to_pixels(const Drawing& drawing, std::size_t beam, int 
   test_samples(drawing, beam, scratch.chosen, scratch);
   for (std::size_t k = 0; k < scratch.chosen.size(); ++k) {
     const std::size_t p = scratch.chosen[k];
-    const PixelShare share = share_of_pixel(scratch, k);
+    const PixelShare share = scratch.pixel_shares[k];
     if (share.mean > 0) sun[p - first] += seen.reflected(samples.centre[p], share.mean);
     if (share.has_end) ends_[beam * static_cast<std::size_t>(height) + static_cast<std::size_t>(row)].push_back(p);
   }
 }
 
-// Finds what arrives of a beam at all samples of pixels, on the planes of their points.
+// Finds what pixels receive of a beam, at samples on the planes of their points: at more of them where light ends.
 void FrameRenderer::test_samples(const Drawing& drawing, std::size_t beam, std::span<const std::size_t> pixels,
                                  Scratch& scratch) {
-  const SeenBeam& seen = drawing.beams[beam];
-  const std::size_t sample_count = places_.size();
-  scratch.points.clear();
-  for (const std::size_t p : pixels) {
-    is_edge_[p] = 1;
-    is_tested_[beam][p] = 1;
-    put_on_plane(drawing, samples_->centre[p], places_, scratch);
+  scratch.pixel_shares.resize(pixels.size());
+  scratch.ending.clear();
+  test_at(places_, drawing, beam, pixels, scratch);
+  for (std::size_t k = 0; k < pixels.size(); ++k) {
+    is_edge_[pixels[k]] = 1;
+    is_tested_[beam][pixels[k]] = 1;
+    const std::span<const float> shares = scratch.shares_of_pixel(k, places_.size());
+    const auto [least, most] = std::minmax_element(shares.begin(), shares.end());
+    scratch.pixel_shares[k] = {mean_of(shares), *most - *least > kSameShare};
+    if (scratch.pixel_shares[k].has_end) scratch.ending.push_back(pixels[k]);
   }
-  scratch.shares.resize(scratch.points.size());
-  for (std::size_t k = 0; k < scratch.points.size(); k += sample_count)
-    seen.find_shares(scratch.points[k].surface, {&scratch.points[k], sample_count}, {&scratch.shares[k], sample_count},
-                     scratch.rays);
-  seen.trace(scratch.rays);
+  test_at(finer_places_, drawing, beam, scratch.ending, scratch);
+  std::size_t ending = 0;
+  for (PixelShare& share : scratch.pixel_shares)
+    if (share.has_end) share.mean = mean_of(scratch.shares_of_pixel(ending++, finer_places_.size()));
 }
 
-FrameRenderer::PixelShare FrameRenderer::share_of_pixel(const Scratch& scratch, std::size_t k) const {
-  const std::span<const float> shares(&scratch.shares[k * places_.size()], places_.size());
-  const auto [least, most] = std::minmax_element(shares.begin(), shares.end());
-  return {std::accumulate(shares.begin(), shares.end(), 0.f) / static_cast<float>(shares.size()),
-          *most - *least > kSameShare};
+// What arrives of a beam at places of pixels.
+void FrameRenderer::test_at(std::span<const glm::vec2> places, const Drawing& drawing, std::size_t beam,
+                            std::span<const std::size_t> pixels, Scratch& scratch) const {
+  const SeenBeam& seen = drawing.beams[beam];
+  scratch.points.clear();
+  for (const std::size_t p : pixels) put_on_plane(drawing, samples_->centre[p], places, scratch);
+  scratch.shares.resize(scratch.points.size());
+  for (std::size_t k = 0; k < scratch.points.size(); k += places.size())
+    seen.find_shares(scratch.points[k].surface, {&scratch.points[k], places.size()}, {&scratch.shares[k], places.size()},
+                     scratch.rays);
+  seen.trace(scratch.rays);
 }
 
 // Where light ends in a pixel it goes on ending in one beside it: light or shade narrower than a pixel may pass between
@@ -163,7 +175,7 @@ void FrameRenderer::follow_ends(const Drawing& drawing, std::size_t beam, Pictur
       for (std::size_t k = begin; k < end; ++k) {
         const std::size_t p = beside[k];
         const BeamPoint& point = samples_->centre[p];
-        const PixelShare share = share_of_pixel(scratch, k - begin);
+        const PixelShare share = scratch.pixel_shares[k - begin];
         const float at_point = centre_shares(beam, static_cast<int>(p / width))[p % width];
         if (share.mean != at_point)
           sun[p] = glm::max(sun[p] - seen.reflected(point, at_point), glm::vec3(0)) + seen.reflected(point, share.mean);
@@ -264,8 +276,7 @@ void FrameRenderer::add_to_parts(const Drawing& drawing, std::size_t beam, int r
   });
   seen.trace(scratch.rays);
   for_chosen([&](const ViewSamples::Part& part, std::size_t begin, std::size_t size) {
-    const float mean =
-        std::accumulate(&scratch.shares[begin], &scratch.shares[begin] + size, 0.f) / static_cast<float>(size);
+    const float mean = mean_of({&scratch.shares[begin], size});
     for (std::size_t k = part.first; k < part.last && mean > 0; ++k)
       sun[samples.fine[k].pixel - row * width] += seen.reflected(samples.fine[k], mean);
   });

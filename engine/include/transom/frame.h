@@ -101,7 +101,8 @@ class FrameRenderer {
     bool has_end;
   };
   void test_samples(const Drawing& drawing, std::size_t beam, std::span<const std::size_t> pixels, Scratch& scratch);
-  PixelShare share_of_pixel(const Scratch& scratch, std::size_t k) const;
+  void test_at(std::span<const glm::vec2> places, const Drawing& drawing, std::size_t beam,
+               std::span<const std::size_t> pixels, Scratch& scratch) const;
   void follow_ends(const Drawing& drawing, std::size_t beam, Picture& sun);
   void add_to_parts(const Drawing& drawing, std::size_t beam, int row, Scratch& scratch, glm::vec3* sun);
   void put_on_plane(const Drawing& drawing, BeamPoint point, std::span<const glm::vec2> places, Scratch& scratch) const;
