@@ -30,6 +30,7 @@ constexpr float kSteep = 6;    // and is divided whatever its middle says: a ste
 constexpr float kSloping = 2;  // from which on the middle is to be right to this share of the tolerance:
 constexpr float kSlopingShare = 0.35f;
 constexpr float kNear = 0.18f;  // length of a part against the distance of what it sees
+constexpr float kGap = 0.05f;   // distance of what nodes see against that length: they are in a gap between surfaces
 
 constexpr float kGrouping = 1.5e-4f;  // of what a node receives from patches: what a group of these may err by
 
@@ -297,10 +298,22 @@ bool Engine::is_worth_a_look(const NodeTrial& trial, int part, int level, float 
     distance = std::min(distance, trial.rows[node].harmonic_distance);
   }
   if (exposed == 0) return level == 0;
+  if (is_at_mouth_of_gap(trial, part)) return true;
   if (exposed < corner_count) return true;
   if (level == 0 && length > distance) return true;
   const float limit = nodes_->is_split(part) ? kLookSplit : length > kNear * distance ? kLookNear : kLookFar;
   return trial.difference(*nodes_, part) > limit * tolerance * trial.leniency(*nodes_, part);
+}
+
+// Whether all nodes of a part are in a gap between surfaces, and some places of it are not: nodes say nothing of these.
+bool Engine::is_at_mouth_of_gap(const NodeTrial& trial, int part) const {
+  const glm::vec2 size = nodes_->size(part);
+  const float gap = kGap * std::max(size.x, size.y);
+  for (int k = 0; k < nodes_->corner_count(part); ++k) {
+    const int node = nodes_->corners(part)[k];
+    if (nodes_->is_exposed(node) && trial.rows[node].harmonic_distance > gap) return false;
+  }
+  return nodes_->is_partly_covered(part, 2 * gap);
 }
 
 // Whether the corners of a part are wrong about its middle.
@@ -314,7 +327,7 @@ bool Engine::is_to_be_divided(const NodeTrial& trial, int part, int level, float
     return is_any_exposed && level < kBuriedLevels && leniency < kLargeForBuried;
   }
   const float difference = trial.difference(*nodes_, part);
-  if (difference > kSteep * tolerance * leniency) return true;
+  if (difference > kSteep * tolerance * leniency || is_at_mouth_of_gap(trial, part)) return true;
   const float bound = tolerance * leniency * (difference > kSloping * tolerance * leniency ? kSlopingShare : 1.f);
   return std::any_of(trial.lights.begin(), trial.lights.end(), [&](const TrialLight& light) {
     const float found = light.at_nodes[middle];

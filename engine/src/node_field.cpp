@@ -14,6 +14,8 @@ constexpr float kInset = 0.15f;
 constexpr float kTriangleInset = 0.02f;
 constexpr float kBorder = 1e-4f;  // of a part: nearer than that is at the border of the face
 constexpr float kLeastWeight = 1e-3f;
+constexpr float kCoverPlaces[]{0.02f, 0.34f, 0.66f, 0.97f};  // along each axis of a part
+constexpr float kCovered = 0.3f;  // of the length of a part: what stands nearer to a place leaves it little light
 constexpr float kLongAspect = 1.6f;      // from which a part is divided along its longer axis alone
 constexpr float kFlatCosine = 0.99999f;  // between shading normals of corners: across a curve light does change
 constexpr float kPlaceScale = 1 << 20;   // steps of the parameters of a face that tell places of nodes apart
@@ -132,7 +134,9 @@ void NodeField::expose(const std::vector<char>& is_exposed, int first_part) {
   parallel_ranges(parts_.size() - static_cast<std::size_t>(first_part), 32, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
       Part& part = parts_[static_cast<std::size_t>(first_part) + p];
-      if (part.first_child < 0) part.is_split = is_parted(part);
+      if (part.first_child >= 0) continue;
+      part.covered = covered_nodes(part);
+      part.is_split = part.covered != 0 || is_parted(part);
     }
   });
 }
@@ -159,6 +163,41 @@ bool NodeField::is_parted(const Part& part) const {
   }
   rays_.occluded(RayScene::What::kOpaque, {rays, count}, {blocked, count});
   return std::any_of(blocked, blocked + count, [](std::uint8_t b) { return b != 0; });
+}
+
+bool NodeField::is_covered(const Part& part, glm::vec3 point, glm::vec3 normal) const {
+  const glm::vec2 size = this->size(part);
+  const Ray ray{point, kCovered * std::max(size.x, size.y) * normal, 0, 1};
+  std::uint8_t blocked = 0;
+  rays_.occluded(RayScene::What::kOpaque, {&ray, 1}, {&blocked, 1});
+  return blocked != 0;
+}
+
+// As Part has them.
+std::uint8_t NodeField::covered_nodes(const Part& part) const {
+  std::array<int, 5> nodes;
+  const std::size_t node_count = nodes_of(part, nodes);
+  unsigned covered = 0;
+  for (std::size_t k = 0; k < node_count; ++k)
+    if (is_covered(part, nodes_[nodes[k]].position, nodes_[nodes[k]].normal)) covered |= 1u << k;
+  return static_cast<std::uint8_t>(covered + 1 == 1u << node_count ? 0 : covered);
+}
+
+// Asked along the normal, also right beside the borders: there most gaps end.
+bool NodeField::is_partly_covered(int index, float reach) const {
+  const Part& part = parts_[index];
+  const int face = part.surface / 2, side = part.surface % 2;
+  std::vector<Ray> rays;
+  for (const float v : kCoverPlaces)
+    for (const float u : kCoverPlaces) {
+      if (!is_quad(part) && u + v > 1) continue;
+      const glm::vec2 st = part.corner + u * part.u + v * part.v;
+      const glm::vec3 normal = mesh_.faces().faces[face].shading_normal(st);
+      rays.push_back({mesh_.lifted_position(face, side, st), (side == 0 ? reach : -reach) * normal, 0, 1});
+    }
+  std::vector<std::uint8_t> covered(rays.size());
+  rays_.occluded(RayScene::What::kOpaque, rays, covered);
+  return std::any_of(covered.begin(), covered.end(), [&](std::uint8_t c) { return c != covered.front(); });
 }
 
 NodeShares NodeField::between_corners(const Part& part, glm::vec2 own) const {
@@ -215,6 +254,25 @@ NodeShares NodeField::between_middle_and_corners(const Part& part, glm::vec2 own
   return shares;
 }
 
+// Where some nodes of a part are covered and others not, those speak for a place that are as it is, if it sees any.
+bool NodeField::keep_fitting(const Part& part, glm::vec3 point, glm::vec3 normal, NodeShares& shares) const {
+  if (part.covered != 0) {
+    std::array<int, 5> nodes;
+    const std::size_t node_count = nodes_of(part, nodes);
+    NodeShares alike = shares;
+    const bool is_place_covered = is_covered(part, point, normal);
+    for (int k = 0; k < alike.count; ++k) {
+      const auto place = std::find(nodes.begin(), nodes.begin() + static_cast<std::ptrdiff_t>(node_count), alike.node[k]);
+      if ((part.covered >> (place - nodes.begin()) & 1) != static_cast<int>(is_place_covered)) alike.weight[k] = 0;
+    }
+    if (keep_visible(point, alike)) {
+      shares = alike;
+      return true;
+    }
+  }
+  return keep_visible(point, shares);
+}
+
 bool NodeField::keep_visible(glm::vec3 point, NodeShares& shares) const {
   Ray rays[4];
   std::uint8_t blocked[4];
@@ -235,7 +293,8 @@ bool NodeField::keep_visible(glm::vec3 point, NodeShares& shares) const {
 NodeShares NodeField::predict_middle(int index) const {
   const Part& part = parts_[index];
   NodeShares shares = between_corners(part, is_quad(part) ? glm::vec2(0.5f) : glm::vec2(1.f / 3));
-  if (part.is_split && !keep_visible(nodes_[part.middle_node].position, shares)) return {};
+  const Node& middle = nodes_[part.middle_node];
+  if (part.is_split && !keep_fitting(part, middle.position, middle.normal, shares)) return {};
   return shares;
 }
 
@@ -275,10 +334,12 @@ NodeShares NodeField::interpolate(int face, Side side, glm::vec2 st, glm::vec3 l
   if (part.centre >= 0) return between_midpoints(part, own);
   const bool has_middle = part.middle_node >= 0 && node_is_exposed_[part.middle_node];
   NodeShares shares = has_middle ? between_middle_and_corners(part, own) : between_corners(part, own);
-  if (!part.is_split || keep_visible(lifted_point, shares)) return shares;
+  if (!part.is_split) return shares;
+  const glm::vec3 front = mesh_.faces().faces[face].shading_normal(st), normal = side == 0 ? front : -front;
+  if (keep_fitting(part, lifted_point, normal, shares)) return shares;
   if (!has_middle) return {};
   shares = between_corners(part, own);
-  return keep_visible(lifted_point, shares) ? shares : NodeShares{};
+  return keep_fitting(part, lifted_point, normal, shares) ? shares : NodeShares{};
 }
 
 }  // namespace transom

@@ -216,6 +216,7 @@ class Engine {
                      std::vector<Share>& patches) const;
   bool is_worth_a_look(const NodeTrial& trial, int part, int level, float tolerance) const;
   bool is_to_be_divided(const NodeTrial& trial, int part, int level, float tolerance) const;
+  bool is_at_mouth_of_gap(const NodeTrial& trial, int part) const;
   void gather_nodes(Known& known);
   void link_nodes(const Known& known);
   std::uint32_t node_seed(const Node& node) const;

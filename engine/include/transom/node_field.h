@@ -63,6 +63,8 @@ class NodeField {
   int part_count() const { return static_cast<int>(parts_.size()); }
   /// Whether something stands between nodes of a part, or one of them lies inside a solid.
   bool is_split(int part) const { return parts_[part].is_split; }
+  /// Whether something opaque stands within `reach` [m] in front of some places of a part and not of others.
+  bool is_partly_covered(int part, float reach) const;
   /// Corners of a part: 4, or 3 on a triangle.
   int corner_count(int part) const { return is_quad(parts_[part]) ? 4 : 3; }
   const std::array<int, 4>& corners(int part) const { return parts_[part].corner_node; }
@@ -107,6 +109,7 @@ class NodeField {
     int first_child = -1;
     std::uint8_t division = 0;  // of u: bit 0; of v: bit 1
     char is_split = 0;
+    std::uint8_t covered = 0;  // which of its corners and its middle are, bit by bit; 0 where all are
     // Nodes or midpoints: of the border from corner k to the next; and of the part, -1 if it has none.
     std::array<int, 4> between{};
     int centre = -1;
@@ -121,6 +124,8 @@ class NodeField {
   int node_at(int surface, glm::vec2 st);
   std::size_t nodes_of(const Part& part, std::array<int, 5>& nodes) const;
   bool is_parted(const Part& part) const;
+  bool is_covered(const Part& part, glm::vec3 point, glm::vec3 normal) const;
+  std::uint8_t covered_nodes(const Part& part) const;
   NodeShares between_corners(const Part& part, glm::vec2 own) const;
   NodeShares between_middle_and_corners(const Part& part, glm::vec2 own) const;
   NodeShares between_midpoints(const Part& part, glm::vec2 own) const;
@@ -128,6 +133,7 @@ class NodeField {
   std::vector<Share> midway(const Border& border, const Lines& lines, std::span<const LightAtNodes> lights) const;
   std::vector<Share> blended(const Part& part, const std::array<std::span<const Share>, 4>& borders) const;
   bool is_open_between(int a, int b) const;
+  bool keep_fitting(const Part& part, glm::vec3 point, glm::vec3 normal, NodeShares& shares) const;
   bool keep_visible(glm::vec3 point, NodeShares& shares) const;
 
   const LightMesh& mesh_;
