@@ -39,7 +39,8 @@ class GreySums {
   explicit GreySums(const std::vector<float>& values) : value_(values.data()) {}
   template <typename Offset>
   void add(Eight weights, const Offset* offset) {
-    sums_ = _mm256_add_ps(sums_, _mm256_mul_ps(weights, _mm256_i32gather_ps(value_, offsets(offset), sizeof(float) / 2)));
+    sums_ =
+        _mm256_add_ps(sums_, _mm256_mul_ps(weights, _mm256_i32gather_ps(value_, offsets(offset), sizeof(float) / 2)));
   }
   float total() const {
     alignas(32) float lane[kLanes];

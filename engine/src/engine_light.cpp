@@ -75,12 +75,6 @@ Lighting Engine::direct_light_of(Condition condition) const {
   return lighting;
 }
 
-// In a loop on all threads.
-template <typename Body>
-void Engine::for_shown_nodes(const Body& body) const {
-  parallel_indices(shown_nodes_.size(), 64, [&](std::size_t k) { body(shown_nodes_[k]); });
-}
-
 // Light of the sky, the ground and panels on patches and at nodes.
 void Engine::find_sky_light(Lighting& lighting) const {
   const TracePhase phase(trace_, "sky");

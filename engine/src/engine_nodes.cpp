@@ -377,8 +377,7 @@ void Engine::gather_nodes(Known& known) {
   const std::vector<float> settled = find_rounds(trial);
   if (!settled.empty()) {
     const std::vector<float> seen_from_afar = send_unevenly(settled);
-    parallel_indices(trial.rows.size(), kGrain,
-                     [&](std::size_t i) { see_from_afar(seen_from_afar, trial.rows[i].near, trial.patches[i]); });
+    for_shown_nodes([&](std::size_t i) { see_from_afar(seen_from_afar, trial.rows[i].near, trial.patches[i]); });
   }
   // Only now: to what sends close by, nodes alone may speak for elements.
   std::vector<LightAtNodes> lights;
@@ -388,12 +387,12 @@ void Engine::gather_nodes(Known& known) {
   keep_node_rows(trial, known);
 }
 
-// Far patches in the rows of nodes give way to groups of them.
+// Far patches in the rows of shown nodes give way to groups of them.
 void Engine::group_far_patches(std::vector<std::vector<Share>>& rows) const {
   const PatchGroups& groups = interreflection_->groups();
   std::vector<PatchGroups::TypicalLight> lights;
   for (const std::vector<float>& light : smooth_lights_) lights.push_back(groups.typical(light));
-  parallel_indices(rows.size(), 64, [&](std::size_t i) { rows[i] = groups.grouped(rows[i], lights, kGrouping); });
+  for_shown_nodes([&](std::size_t i) { rows[i] = groups.grouped(rows[i], lights, kGrouping); });
 }
 
 // Moves what the nodes have seen to where relighting and later edits look for it.
@@ -402,8 +401,10 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
   facts_.kept_node_rows =
       static_cast<int>(std::count_if(known.node.begin(), known.node.end(), [](int node) { return node >= 0; }));
   known.has_same_nodes = known.has_same_faces() && nodes_->nodes() == known.engine->nodes_->nodes();
-  group_far_patches(trial.patches);
-  node_patches_ = CompactRows(SparseRows::of(trial.patches));
+  std::vector<std::vector<Share>> patches(trial.patches.size());  // of shown nodes; what others see serves no more
+  for_shown_nodes([&](std::size_t i) { patches[i] = std::move(trial.patches[i]); });
+  group_far_patches(patches);
+  node_patches_ = CompactRows(SparseRows::of(patches));
   trial.patches.clear();
   node_sky_ = SkyRows(SparseRows::of(trial.rows, &GatherRow::sky), ground_bin());
   const auto found = std::make_shared<NodeRows>();

@@ -29,13 +29,11 @@ struct FrameRenderer::Scratch {
   ShadowRays rays;
   std::vector<BeamPoint> points;
   std::vector<float> shares, highest, lowest;
-  std::vector<std::size_t> chosen, ending;
+  std::vector<std::size_t> chosen;
+  std::vector<EndingPixel> ending;
   std::vector<PixelShare> pixel_shares;
   std::vector<glm::vec2> places;
   std::vector<glm::vec3> positions;
-
-  // Of the pixel with number `k` among those that have been tested at `count` places each.
-  std::span<const float> shares_of_pixel(std::size_t k, std::size_t count) const { return {&shares[k * count], count}; }
 };
 
 }  // namespace transom

@@ -109,37 +109,74 @@ void FrameRenderer::add_to_pixels(const Drawing& drawing, std::size_t beam, int 
   }
 }
 
-// Finds what pixels receive of a beam, at samples on the planes of their points: at more of them where light ends.
-void FrameRenderer::test_samples(const Drawing& drawing, std::size_t beam, std::span<const std::size_t> pixels,
-                                 Scratch& scratch) {
-  scratch.pixel_shares.resize(pixels.size());
-  scratch.ending.clear();
-  test_at(places_, drawing, beam, pixels, scratch);
-  for (std::size_t k = 0; k < pixels.size(); ++k) {
-    is_edge_[pixels[k]] = 1;
-    is_tested_[beam][pixels[k]] = 1;
-    const std::span<const float> shares = scratch.shares_of_pixel(k, places_.size());
-    const auto [least, most] = std::minmax_element(shares.begin(), shares.end());
-    scratch.pixel_shares[k] = {mean_of(shares), *most - *least > kSameShare};
-    if (scratch.pixel_shares[k].has_end) scratch.ending.push_back(pixels[k]);
-  }
-  test_at(finer_places_, drawing, beam, scratch.ending, scratch);
-  std::size_t ending = 0;
-  for (PixelShare& share : scratch.pixel_shares)
-    if (share.has_end) share.mean = mean_of(scratch.shares_of_pixel(ending++, finer_places_.size()));
+// Of points on one surface, from number `first` on.
+void FrameRenderer::find_shares_of_pixel(const SeenBeam& seen, std::size_t first, std::size_t count, Scratch& scratch) {
+  seen.find_shares(scratch.points[first].surface, {&scratch.points[first], count}, {&scratch.shares[first], count},
+                   scratch.rays);
 }
 
-// What arrives of a beam at places of pixels.
-void FrameRenderer::test_at(std::span<const glm::vec2> places, const Drawing& drawing, std::size_t beam,
-                            std::span<const std::size_t> pixels, Scratch& scratch) const {
+// Finds what pixels receive of a beam, at all samples on the planes of their points. Where it ends among them, the
+// places of the finer grid are tested that are in the squares of samples beside its end.
+void FrameRenderer::test_samples(const Drawing& drawing, std::size_t beam, std::span<const std::size_t> pixels,
+                                 Scratch& scratch) {
   const SeenBeam& seen = drawing.beams[beam];
+  const std::size_t sample_count = places_.size();
   scratch.points.clear();
-  for (const std::size_t p : pixels) put_on_plane(drawing, samples_->centre[p], places, scratch);
+  for (const std::size_t p : pixels) {
+    is_edge_[p] = 1;
+    is_tested_[beam][p] = 1;
+    put_on_plane(drawing, samples_->centre[p], places_, scratch);
+  }
   scratch.shares.resize(scratch.points.size());
-  for (std::size_t k = 0; k < scratch.points.size(); k += places.size())
-    seen.find_shares(scratch.points[k].surface, {&scratch.points[k], places.size()}, {&scratch.shares[k], places.size()},
-                     scratch.rays);
+  for (std::size_t k = 0; k < scratch.points.size(); k += sample_count)
+    find_shares_of_pixel(seen, k, sample_count, scratch);
   seen.trace(scratch.rays);
+
+  scratch.points.clear();
+  scratch.ending.clear();
+  scratch.pixel_shares.clear();
+  for (std::size_t k = 0; k < pixels.size(); ++k) {
+    const std::span<const float> shares(&scratch.shares[k * sample_count], sample_count);
+    const auto [least, most] = std::minmax_element(shares.begin(), shares.end());
+    scratch.pixel_shares.push_back({mean_of(shares), *most - *least > kSameShare});
+    if (!scratch.pixel_shares.back().has_end) continue;
+    const float known = choose_beside_end(shares, scratch);
+    scratch.ending.push_back({k, scratch.points.size(), scratch.places.size(), known});
+    put_on_plane(drawing, samples_->centre[pixels[k]], scratch.places, scratch);
+  }
+  scratch.shares.resize(scratch.points.size());
+  for (const EndingPixel& pixel : scratch.ending) find_shares_of_pixel(seen, pixel.first, pixel.count, scratch);
+  seen.trace(scratch.rays);
+  for (const EndingPixel& pixel : scratch.ending) {
+    const auto first = scratch.shares.begin() + static_cast<std::ptrdiff_t>(pixel.first);
+    scratch.pixel_shares[pixel.number].mean =
+        std::accumulate(first, first + static_cast<std::ptrdiff_t>(pixel.count), pixel.known) /
+        static_cast<float>(finer_places_.size());
+  }
+}
+
+// Of a pixel in which light ends, by what its samples receive: the places of the finer grid in the squares of those
+// that one beside them, in a row or a column, differs from. Returns the sum of what the other places receive.
+float FrameRenderer::choose_beside_end(std::span<const float> shares, Scratch& scratch) const {
+  const int s = samples_->edge_samples;
+  float known = 0;
+  scratch.places.clear();
+  for (int y = 0; y < s; ++y)
+    for (int x = 0; x < s; ++x) {
+      const float own = shares[static_cast<std::size_t>(y * s + x)];
+      const auto differs = [&](int i, int j) {
+        return i >= 0 && i < s && j >= 0 && j < s &&
+               std::abs(shares[static_cast<std::size_t>(j * s + i)] - own) > kSameShare;
+      };
+      if (!differs(x - 1, y) && !differs(x + 1, y) && !differs(x, y - 1) && !differs(x, y + 1)) {
+        known += kFiner * kFiner * own;
+        continue;
+      }
+      for (int j = kFiner * y; j < kFiner * (y + 1); ++j)
+        for (int i = kFiner * x; i < kFiner * (x + 1); ++i)
+          scratch.places.push_back(finer_places_[static_cast<std::size_t>(j * kFiner * s + i)]);
+    }
+  return known;
 }
 
 // Where light ends in a pixel it goes on ending in one beside it: light or shade narrower than a pixel may pass between

@@ -5,14 +5,7 @@
 
 namespace transom {
 
-CellPoint Grid::locate(glm::vec2 st) const {
-  st = glm::clamp(st, 0.f, 1.f);
-  if (is_quad) {
-    const glm::vec2 scaled = st * glm::vec2(u_count, v_count);
-    const int i = std::min(static_cast<int>(scaled.x), u_count - 1);
-    const int j = std::min(static_cast<int>(scaled.y), v_count - 1);
-    return {j * u_count + i, scaled - glm::vec2(i, j)};
-  }
+CellPoint Grid::locate_in_triangle(glm::vec2 st) const {
   const int n = u_count;
   if (st.x + st.y > 1) st /= st.x + st.y;
   const glm::vec2 scaled = st * static_cast<float>(n);

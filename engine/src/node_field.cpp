@@ -15,8 +15,8 @@ constexpr float kTriangleInset = 0.02f;
 constexpr float kBorder = 1e-4f;  // of a part: nearer than that is at the border of the face
 constexpr float kLeastWeight = 1e-3f;
 constexpr float kCoverPlaces[]{0.02f, 0.34f, 0.66f, 0.97f};  // along each axis of a part
-constexpr float kCovered = 0.3f;  // of the length of a part: what stands nearer to a place leaves it little light
-constexpr float kLongAspect = 1.6f;      // from which a part is divided along its longer axis alone
+constexpr float kCovered = 0.3f;     // of the length of a part: what stands nearer to a place leaves it little light
+constexpr float kLongAspect = 1.6f;  // from which a part is divided along its longer axis alone
 constexpr float kFlatCosine = 0.99999f;  // between shading normals of corners: across a curve light does change
 constexpr float kPlaceScale = 1 << 20;   // steps of the parameters of a face that tell places of nodes apart
 constexpr float kSamePlace = 0.1f;       // of a step: what rounding makes of one place at most
@@ -262,7 +262,8 @@ bool NodeField::keep_fitting(const Part& part, glm::vec3 point, glm::vec3 normal
     NodeShares alike = shares;
     const bool is_place_covered = is_covered(part, point, normal);
     for (int k = 0; k < alike.count; ++k) {
-      const auto place = std::find(nodes.begin(), nodes.begin() + static_cast<std::ptrdiff_t>(node_count), alike.node[k]);
+      const auto place =
+          std::find(nodes.begin(), nodes.begin() + static_cast<std::ptrdiff_t>(node_count), alike.node[k]);
       if ((part.covered >> (place - nodes.begin()) & 1) != static_cast<int>(is_place_covered)) alike.weight[k] = 0;
     }
     if (keep_visible(point, alike)) {

@@ -63,7 +63,7 @@ class SolveOptions:
     node_rays: int = 1024
     node_opening_rays: int = 384
     panel_rays: int = 256
-    node_tolerance: float = 0.06
+    node_tolerance: float = 0.054
     tolerance: float = 2.5e-4
     seed: int = 1
 

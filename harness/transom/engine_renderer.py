@@ -27,7 +27,7 @@ class EngineRenderer:
     """
 
     name = "engine"
-    version = "5"
+    version = "6"
 
     def __init__(self) -> None:
         self._solved: dict[tuple[str, SolveOptions], tuple[Engine, float]] = {}

@@ -44,22 +44,23 @@ std::vector<glm::dvec3> below_and_beside_the_slab() {
   return points;
 }
 
-/// Relative differences of the luminance shown of the floor from what is gathered there, without any node between.
-std::vector<double> errors_on_floor(const SceneGeometry& scene, float node_tolerance) {
+/// Relative differences of the luminance shown at points of a surface that looks along `normal` from what is gathered
+/// there, without any node between.
+std::vector<double> errors_at(const std::vector<glm::dvec3>& points, glm::vec3 normal, const SceneGeometry& scene,
+                              float node_tolerance) {
   const Engine engine(scene, tregenza(), options(node_tolerance));
   const auto light = engine.relight(uniform_sky(1000));
-  const std::vector<glm::dvec3> points = below_and_beside_the_slab();
-  Sensors sensors = engine.sensors(points, std::vector<glm::vec3>(points.size(), {0, 0, 1}), {4096, 2048});
+  Sensors sensors = engine.sensors(points, std::vector<glm::vec3>(points.size(), normal), {4096, 2048});
   for (Share& share : sensors.resolved.entries) share.weight = 0;
   const std::vector<Irradiance> gathered = engine.illuminance(*light, sensors);
   std::vector<glm::vec4> sky, indirect;
   engine.shown_radiance(*light, sky, indirect);
   std::vector<double> errors;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const glm::vec3 above = glm::vec3(points[i] - engine.faces().origin) + glm::vec3(0, 0, 0.05f);
-    const Ray down{above, {0, 0, -1}};
+    const glm::vec3 above = glm::vec3(points[i] - engine.faces().origin) + 0.05f * normal;
+    const Ray back{above, -normal};
     Hit hit;
-    engine.rays().intersect(RayScene::What::kOpaque, {&down, 1}, {&hit, 1});
+    engine.rays().intersect(RayScene::What::kOpaque, {&back, 1}, {&hit, 1});
     const NodeShares shares =
         engine.shown_at(hit.face, hit.side, hit.st, engine.mesh().lifted_position(hit.face, hit.side, hit.st));
     double shown = 0;
@@ -69,6 +70,10 @@ std::vector<double> errors_on_floor(const SceneGeometry& scene, float node_toler
     errors.push_back(shown / truth - 1);
   }
   return errors;
+}
+
+std::vector<double> errors_on_floor(const SceneGeometry& scene, float node_tolerance) {
+  return errors_at(below_and_beside_the_slab(), {0, 0, 1}, scene, node_tolerance);
 }
 
 double mean_size(const std::vector<double>& errors) {
@@ -91,6 +96,27 @@ TEST(Nodes, ThatAreAddedShowAContactShadowAsItIsGathered) {
   EXPECT_GT(mean_size(none), 0.04);
   EXPECT_LT(mean_size(added), 0.5 * tolerance);
   EXPECT_LT(largest(added), 0.5 * largest(none));
+}
+
+/// Two books 2 mm apart; the second is as large as the first up to a place.
+SceneGeometry room_with_books(double y, double z) {
+  SceneGeometry scene = roof_light_room(0.5f);
+  add_box(scene, {1, 1.5, 0.2}, {1.14, 1.7, 0.54}, 0);
+  add_box(scene, {1.142, 1.5, 0.2}, {1.3, y, z}, 0);
+  return scene;
+}
+
+TEST(Nodes, InAGapDoNotDarkenWhatStandsOutOfIt) {
+  // By 20 mm above a lower book, where the nodes of the larger one's cells are all behind that, well inside borders.
+  std::vector<glm::dvec3> above, beside;
+  for (double y = 1.52; y < 1.68; y += 0.015)
+    for (const double z : {0.528, 0.536}) above.push_back({1.14, y, z});
+  const float tolerance = SolveOptions{}.node_tolerance;
+  EXPECT_LT(mean_size(errors_at(above, {1, 0, 0}, room_with_books(1.7, 0.52), tolerance)), 0.06);
+  // By 80 mm beside a narrower one.
+  for (double z = 0.22; z < 0.5; z += 0.03)
+    for (const double y : {1.64, 1.66}) beside.push_back({1.14, y, z});
+  EXPECT_LT(mean_size(errors_at(beside, {1, 0, 0}, room_with_books(1.62, 0.54), tolerance)), 0.06);
 }
 
 TEST(Nodes, LightDecaysUnderALowSlabAsItDoesBetweenFinerPatches) {

@@ -19,6 +19,7 @@
 #include "transom/lighting.h"
 #include "transom/node_field.h"
 #include "transom/panels.h"
+#include "transom/parallel.h"
 #include "transom/point_links.h"
 #include "transom/ray_scene.h"
 #include "transom/scene_change.h"
@@ -42,9 +43,10 @@ struct SolveOptions {
   int elements_per_edge = 4;      ///< a patch has the square of it
   GatherSamples patch_samples{512, 128};
   GatherSamples node_samples{1024, 384};
-  int panel_rays = 256;          ///< outwards from a panel, for each incident bin
-  float node_tolerance = 0.06f;  ///< relative error of interpolated light from which on nodes are added; infinity: none
-  double tolerance = 2.5e-4;     ///< flux in flight at which interreflection stops, relative
+  int panel_rays = 256;  ///< outwards from a panel, for each incident bin
+  float node_tolerance =
+      0.055f;                 ///< relative error of interpolated light from which on nodes are added; infinity: none
+  double tolerance = 2.5e-4;  ///< flux in flight at which interreflection stops, relative
   std::uint32_t seed = 1;
   bool trace = false;
 
@@ -315,5 +317,11 @@ class Engine {
   std::unique_ptr<ForwardRays> forward_rays_;
   std::unique_ptr<ProgressiveRadiosity> shooting_;
 };
+
+// In a loop on all threads.
+template <typename Body>
+void Engine::for_shown_nodes(const Body& body) const {
+  parallel_indices(shown_nodes_.size(), 64, [&](std::size_t k) { body(shown_nodes_[k]); });
+}
 
 }  // namespace transom

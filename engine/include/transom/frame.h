@@ -100,9 +100,14 @@ class FrameRenderer {
     float mean;
     bool has_end;
   };
+  struct EndingPixel {
+    std::size_t number;        // among those that are tested
+    std::size_t first, count;  // places that are tested once more
+    float known;               // sum of what the other places of the finer grid receive
+  };
   void test_samples(const Drawing& drawing, std::size_t beam, std::span<const std::size_t> pixels, Scratch& scratch);
-  void test_at(std::span<const glm::vec2> places, const Drawing& drawing, std::size_t beam,
-               std::span<const std::size_t> pixels, Scratch& scratch) const;
+  static void find_shares_of_pixel(const SeenBeam& seen, std::size_t first, std::size_t count, Scratch& scratch);
+  float choose_beside_end(std::span<const float> shares, Scratch& scratch) const;
   void follow_ends(const Drawing& drawing, std::size_t beam, Picture& sun);
   void add_to_parts(const Drawing& drawing, std::size_t beam, int row, Scratch& scratch, glm::vec3* sun);
   void put_on_plane(const Drawing& drawing, BeamPoint point, std::span<const glm::vec2> places, Scratch& scratch) const;

@@ -1,6 +1,7 @@
 /// @file A regular grid on a quad or a triangle: its cells carry patches or elements.
 #pragma once
 
+#include <algorithm>
 #include <glm/glm.hpp>
 
 namespace transom {
@@ -26,7 +27,14 @@ struct Grid {
   int cell_count() const { return is_quad ? u_count * v_count : u_count * u_count; }
 
   /// The cell that holds the parameters `st` (clamped to the face).
-  CellPoint locate(glm::vec2 st) const;
+  CellPoint locate(glm::vec2 st) const {
+    st = glm::clamp(st, 0.f, 1.f);
+    if (!is_quad) return locate_in_triangle(st);
+    const glm::vec2 scaled = st * glm::vec2(u_count, v_count);
+    const int i = std::min(static_cast<int>(scaled.x), u_count - 1),
+              j = std::min(static_cast<int>(scaled.y), v_count - 1);
+    return {j * u_count + i, {scaled.x - static_cast<float>(i), scaled.y - static_cast<float>(j)}};
+  }
 
   /// Parameters on the face of a point of a cell; inverse of locate.
   glm::vec2 parameters(CellPoint point) const;
@@ -36,6 +44,7 @@ struct Grid {
     int i, j;
     bool upper;
   };
+  CellPoint locate_in_triangle(glm::vec2 st) const;
   TriangleCell triangle_cell(int cell) const;
 };
 
