@@ -141,6 +141,7 @@ void FrameRenderer::test_samples(const Drawing& drawing, std::size_t beam, std::
     scratch.pixel_shares.push_back({mean_of(shares), *most - *least > kSameShare});
     if (!scratch.pixel_shares.back().has_end) continue;
     const float known = choose_beside_end(shares, scratch);
+    if (scratch.places.empty()) continue;  // it fades, without an end between samples
     scratch.ending.push_back({k, scratch.points.size(), scratch.places.size(), known});
     put_on_plane(drawing, samples_->centre[pixels[k]], scratch.places, scratch);
   }

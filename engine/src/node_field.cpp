@@ -190,8 +190,7 @@ bool NodeField::is_partly_covered(int index, float reach) const {
   std::vector<Ray> rays;
   for (const float v : kCoverPlaces)
     for (const float u : kCoverPlaces) {
-      if (!is_quad(part) && u + v > 1) continue;
-      const glm::vec2 st = part.corner + u * part.u + v * part.v;
+      const glm::vec2 st = part.corner + (is_quad(part) ? u : u * (1 - v)) * part.u + v * part.v;
       const glm::vec3 normal = mesh_.faces().faces[face].shading_normal(st);
       rays.push_back({mesh_.lifted_position(face, side, st), (side == 0 ? reach : -reach) * normal, 0, 1});
     }

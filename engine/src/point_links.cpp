@@ -370,7 +370,7 @@ std::vector<std::shared_ptr<const PointLinks::Link>> PointLinks::links_of(const 
 std::vector<std::shared_ptr<const PointLinks::Link>> PointLinks::found_links(const std::vector<int>& slots,
                                                                              const Known& known) const {
   std::vector<std::shared_ptr<const Link>> links(slots.size());
-  if (known.links && known.has_same_points)
+  if (known.links && known.has_same_points && known.links->neighbours_ == neighbours_)
     parallel_indices(slots.size(), 1, [&](std::size_t k) {
       const std::shared_ptr<const Link> before = known_link(slots[k], exposed_part(slots[k]), known);
       if (before && (known.has_same_glazing || before->glazed_point.empty())) links[k] = before;

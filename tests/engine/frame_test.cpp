@@ -132,8 +132,6 @@ TEST(Frame, RaysFindShadeThinnerThanAPixelWhereverItLies) {
   }
 }
 
-// A slit's light on the floor, oblique in the picture: neither the one point of a pixel nor those of its neighbours
-// need meet it, but it goes on from where they do.
 TEST(Frame, APixelInWhichTheSunEndsShowsWhatPartOfItIsLit) {
   Engine engine(roof_light_room(0.5f), tregenza(), few_rays());
   const auto light = engine.relight(sunny(0.3f));
@@ -168,6 +166,43 @@ TEST(Frame, APixelInWhichTheSunEndsShowsWhatPartOfItIsLit) {
   EXPECT_LT(largest, 0.06 * full);
 }
 
+// Panes beside each other that pass a little more from one to the next, each less wide than a pixel of its light.
+TEST(Frame, LightThatFadesWithinAPixelWithoutAnEndIsTheMeanOfItsSamples) {
+  SceneGeometry scene = roof_light_room(0.5f);
+  const glm::ivec4 pane = scene.faces.back();
+  const glm::dvec3 corner = scene.vertices[pane.x], across = scene.vertices[pane.y] - corner,
+                   along = scene.vertices[pane.w] - corner;
+  scene.faces.pop_back();
+  scene.face_material.pop_back();
+  scene.openings.clear();
+  scene.materials.pop_back();
+  constexpr int kPanes = 40;
+  constexpr float kFirst = 0.3f, kStep = 0.015f;
+  for (int k = 0; k < kPanes; ++k) {
+    scene.materials.push_back({glm::vec3(0), glm::vec3(0), false, k});
+    scene.openings.push_back({std::vector<float>(2, kFirst + kStep * static_cast<float>(k)), 0.f});
+    const glm::dvec3 left = corner + across * (k / double{kPanes}), right = corner + across * ((k + 1) / double{kPanes});
+    test::add_quad(scene, left, right, right + along, left + along, k + 1);
+  }
+  const Engine engine(scene, tregenza(), few_rays());
+  const auto light = engine.relight(sunny(0));
+  View view;
+  view.position = {2, 2, 2};
+  view.target = {2, 2, 0};
+  view.up = {0, 1, 0};
+  view.width = view.height = 12;
+  view.vertical_fov_rad = 2 * std::atan(0.5 * 12 * 0.08 / 2);  // pixels of 8 cm, panes of 5 cm
+  const Frame frame = FrameRenderer(engine).render(view, *light, {});
+  EXPECT_GT(frame.edge_pixel_count, 100);
+  const double full = 0.5 / std::numbers::pi * 60000 / std::sqrt(1.01);
+  for (int x = 0; x < view.width; ++x) {
+    const double place = 2 + (x - 5.5) * 0.08, pane_number = (place - 1) / 2 * kPanes - 0.5;
+    EXPECT_NEAR(frame.sun[6 * view.width + x].y / full, kFirst + kStep * pane_number, kStep) << x;
+  }
+}
+
+// A slit's light on the floor, oblique in the picture: neither the one point of a pixel nor those of its neighbours
+// need meet it, but it goes on from where they do.
 TEST(Frame, RaysFollowLightNarrowerThanAPixelThatIsObliqueInThePicture) {
   constexpr double kPixel = 0.02, kWidth = 0.4, kSlitHeight = 3.2;  // [m], [pixels], [m]
   SceneGeometry scene = roof_light_room(0.5f);

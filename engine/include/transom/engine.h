@@ -43,9 +43,8 @@ struct SolveOptions {
   int elements_per_edge = 4;      ///< a patch has the square of it
   GatherSamples patch_samples{512, 128};
   GatherSamples node_samples{1024, 384};
-  int panel_rays = 256;  ///< outwards from a panel, for each incident bin
-  float node_tolerance =
-      0.055f;                 ///< relative error of interpolated light from which on nodes are added; infinity: none
+  int panel_rays = 256;           ///< outwards from a panel, for each incident bin
+  float node_tolerance = 0.054f;  ///< of light between nodes, relative; infinity: more only at ends of solids and gaps
   double tolerance = 2.5e-4;  ///< flux in flight at which interreflection stops, relative
   std::uint32_t seed = 1;
   bool trace = false;
@@ -300,7 +299,7 @@ class Engine {
   std::unique_ptr<NodeField> nodes_;
   std::shared_ptr<const NodeRows> node_rows_;
   SkyRows node_sky_;                          // all of the sky
-  CompactRows node_patches_;                  // all that nodes see of patches, far ones in groups
+  CompactRows node_patches_;                  // all that shown nodes see of patches, far ones in groups
   std::vector<NodeShares> nodes_at_element_;  // what speaks for each element of patches, at its middle
   ExactRows node_near_;  // what the nodes, then the patches, send close by: those with their weights, less these
   std::vector<std::size_t> shown_nodes_;                  // the others get no light

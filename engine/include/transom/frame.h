@@ -95,14 +95,14 @@ class FrameRenderer {
   void find_centre_shares(const Drawing& drawing, std::size_t beam, int row);
   void add_beam(const Drawing& drawing, std::size_t beam, int row, glm::vec3* sun);
   void add_to_pixels(const Drawing& drawing, std::size_t beam, int row, Scratch& scratch, glm::vec3* sun);
-  /// Mean share of a beam over the samples of a pixel, and whether its light ends among them.
+  /// Mean share of a beam over a pixel, and whether its light ends among the samples.
   struct PixelShare {
     float mean;
     bool has_end;
   };
   struct EndingPixel {
     std::size_t number;        // among those that are tested
-    std::size_t first, count;  // places that are tested once more
+    std::size_t first, count;  // places of the finer grid that are tested
     float known;               // sum of what the other places of the finer grid receive
   };
   void test_samples(const Drawing& drawing, std::size_t beam, std::span<const std::size_t> pixels, Scratch& scratch);

@@ -29,6 +29,7 @@ struct NodeNeighbours {
   std::span<const int> of(std::size_t i) const {
     return begin.empty() ? std::span<const int>() : std::span(node.data() + begin[i], begin[i + 1] - begin[i]);
   }
+  bool operator==(const NodeNeighbours&) const = default;
 };
 
 /// A light's irradiance by node, read at shown ones. Differences are relative to `dark` at least.
@@ -41,7 +42,9 @@ class BoxTree;
 
 /// Nodes at the corners of cells, and of the parts into which cells are divided where light changes within them. Parts
 /// of one side of a face share the nodes that they have in common. Where something stands between the nodes of a part,
-/// a point asks which of them it sees, so that light does not leak through walls and partitions.
+/// a point asks which of them it sees, so that light does not leak through walls and partitions. Where something covers
+/// some nodes of a part closely and others not, those speak for a point that are as it is: a gap does not darken what
+/// stands out of it.
 ///
 /// Use: make it and say which nodes are exposed; then, as often as wanted, give parts a middle or divide them, and say
 /// the same of the new nodes. In the end find midpoints, which follow how light bends from part to part.
@@ -57,11 +60,11 @@ class NodeField {
   bool is_exposed(std::size_t node) const { return node_is_exposed_[node]; }
 
   /// Says of the nodes that have been added since the last call whether they lie outside solids, and finds the parts
-  /// from number `first_part` on that something divides.
+  /// from number `first_part` on that something divides or covers in part.
   void expose(const std::vector<char>& is_exposed, int first_part);
 
   int part_count() const { return static_cast<int>(parts_.size()); }
-  /// Whether something stands between nodes of a part, or one of them lies inside a solid.
+  /// Whether something stands between nodes of a part or covers some of them, or one of them lies inside a solid.
   bool is_split(int part) const { return parts_[part].is_split; }
   /// Whether something opaque stands within `reach` [m] in front of some places of a part and not of others.
   bool is_partly_covered(int part, float reach) const;
@@ -85,7 +88,7 @@ class NodeField {
   /// Divides a part: in four, or in two along its longer axis where that is much the longer one.
   void divide(int part);
 
-  /// Finds midpoints of four-sided parts that nothing divides: in the middle of their borders, and of themselves,
+  /// Finds midpoints of four-sided parts that nothing splits: in the middle of their borders, and of themselves,
   /// unless a node is there. Light at the middle of a border is that of the polynomial through its ends and the next
   /// node beyond each, as far as each of the typical lights goes on smoothly to there [as in essentially
   /// non-oscillatory schemes: Harten et al. 1987]. The middle of a part blends its borders [Coons 1967]. shown: as

@@ -31,7 +31,7 @@ struct BeamGroup {
   glm::vec3 low{0}, high{0};
 };
 
-constexpr int kFiner = 2;  ///< times as many samples an axis say how much of a pixel each surface covers
+constexpr int kFiner = 2;  ///< times as many samples an axis say how much of a pixel a surface covers or a beam lights
 
 /// Where in its pixel, from its upper left corner, a sample lies. Samples are a grid turned by atan(1 /
 /// samples_per_axis): each has a square of the upright grid, a column and a row of its own, so that an edge along an
