@@ -305,7 +305,8 @@ bool Engine::is_worth_a_look(const NodeTrial& trial, int part, int level, float 
   return trial.difference(*nodes_, part) > limit * tolerance * trial.leniency(*nodes_, part);
 }
 
-// Whether all corners of a part are in a gap between surfaces, and some places of it are not: they say nothing of these.
+// Whether all corners of a part are in a gap between surfaces, and some places of it are not: they say nothing of
+// these.
 bool Engine::is_at_mouth_of_gap(const NodeTrial& trial, int part) const {
   const glm::vec2 size = nodes_->size(part);
   const float gap = kGap * std::max(size.x, size.y);

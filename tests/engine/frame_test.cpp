@@ -181,7 +181,8 @@ TEST(Frame, LightThatFadesWithinAPixelWithoutAnEndIsTheMeanOfItsSamples) {
   for (int k = 0; k < kPanes; ++k) {
     scene.materials.push_back({glm::vec3(0), glm::vec3(0), false, k});
     scene.openings.push_back({std::vector<float>(2, kFirst + kStep * static_cast<float>(k)), 0.f});
-    const glm::dvec3 left = corner + across * (k / double{kPanes}), right = corner + across * ((k + 1) / double{kPanes});
+    const glm::dvec3 left = corner + across * (k / double{kPanes}),
+                     right = corner + across * ((k + 1) / double{kPanes});
     test::add_quad(scene, left, right, right + along, left + along, k + 1);
   }
   const Engine engine(scene, tregenza(), few_rays());

@@ -45,7 +45,7 @@ struct SolveOptions {
   GatherSamples node_samples{1024, 384};
   int panel_rays = 256;           ///< outwards from a panel, for each incident bin
   float node_tolerance = 0.054f;  ///< of light between nodes, relative; infinity: more only at ends of solids and gaps
-  double tolerance = 2.5e-4;  ///< flux in flight at which interreflection stops, relative
+  double tolerance = 2.5e-4;      ///< flux in flight at which interreflection stops, relative
   std::uint32_t seed = 1;
   bool trace = false;
 
