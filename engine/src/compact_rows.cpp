@@ -37,10 +37,9 @@ class GreySums {
  public:
   using Value = float;
   explicit GreySums(const std::vector<float>& values) : value_(values.data()) {}
-  template <typename Offset>
-  void add(Eight weights, const Offset* offset) {
-    sums_ =
-        _mm256_add_ps(sums_, _mm256_mul_ps(weights, _mm256_i32gather_ps(value_, offsets(offset), sizeof(float) / 2)));
+  template <typename Column>
+  void add(Eight weights, const Column* column) {
+    sums_ = _mm256_add_ps(sums_, _mm256_mul_ps(weights, _mm256_i32gather_ps(value_, indices(column), sizeof(float))));
   }
   float total() const {
     alignas(32) float lane[kLanes];
@@ -49,11 +48,11 @@ class GreySums {
   }
 
  private:
-  static __m256i offsets(const std::uint16_t* offset) {
-    return _mm256_cvtepu16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(offset)));
+  static __m256i indices(const std::uint16_t* column) {
+    return _mm256_cvtepu16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(column)));
   }
-  static __m256i offsets(const std::uint32_t* offset) {
-    return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(offset));
+  static __m256i indices(const std::uint32_t* column) {
+    return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(column));
   }
   const float* value_;
   __m256 sums_ = _mm256_setzero_ps();
@@ -63,17 +62,16 @@ class GreySums {
 class ColourSums {
  public:
   using Value = glm::vec4;
-  explicit ColourSums(const std::vector<glm::vec4>& values)
-      : half_value_(reinterpret_cast<const glm::vec2*>(values.data())) {}
-  template <typename Offset>
-  void add(Eight weights, const Offset* offset) {
+  explicit ColourSums(const std::vector<glm::vec4>& values) : value_(values.data()) {}
+  template <typename Column>
+  void add(Eight weights, const Column* column) {
     const auto add_to = [](__m256& sum, __m256 weight, __m256 value) {
       sum = _mm256_add_ps(sum, _mm256_mul_ps(weight, value));
     };
-    add_to(sums_[0], _mm256_permute_ps(weights, 0x00), two(offset));
-    add_to(sums_[1], _mm256_permute_ps(weights, 0x55), two(offset + 1));
-    add_to(sums_[2], _mm256_permute_ps(weights, 0xaa), two(offset + 2));
-    add_to(sums_[3], _mm256_permute_ps(weights, 0xff), two(offset + 3));
+    add_to(sums_[0], _mm256_permute_ps(weights, 0x00), two(column));
+    add_to(sums_[1], _mm256_permute_ps(weights, 0x55), two(column + 1));
+    add_to(sums_[2], _mm256_permute_ps(weights, 0xaa), two(column + 2));
+    add_to(sums_[3], _mm256_permute_ps(weights, 0xff), two(column + 3));
   }
   glm::vec4 total() const {
     const __m256 halves = _mm256_add_ps(_mm256_add_ps(sums_[0], sums_[1]), _mm256_add_ps(sums_[2], sums_[3]));
@@ -83,12 +81,12 @@ class ColourSums {
   }
 
  private:
-  template <typename Offset>
-  __m256 two(const Offset* offset) const {
-    return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(&half_value_[offset[0]].x)),
-                                _mm_loadu_ps(&half_value_[offset[4]].x), 1);
+  template <typename Column>
+  __m256 two(const Column* column) const {
+    return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(&value_[column[0]].x)),
+                                _mm_loadu_ps(&value_[column[4]].x), 1);
   }
-  const glm::vec2* half_value_;
+  const glm::vec4* value_;
   __m256 sums_[4] = {_mm256_setzero_ps(), _mm256_setzero_ps(), _mm256_setzero_ps(), _mm256_setzero_ps()};
 };
 #else
@@ -111,9 +109,9 @@ class GreySums {
  public:
   using Value = float;
   explicit GreySums(const std::vector<float>& values) : value_(values.data()) {}
-  template <typename Offset>
-  void add(const Eight& weights, const Offset* offset) {
-    for (std::size_t k = 0; k < kLanes; ++k) sums_[k] += weights.lane[k] * value_[offset[k] / 2];
+  template <typename Column>
+  void add(const Eight& weights, const Column* column) {
+    for (std::size_t k = 0; k < kLanes; ++k) sums_[k] += weights.lane[k] * value_[column[k]];
   }
   float total() const { return sum_of(sums_); }
 
@@ -126,10 +124,10 @@ class ColourSums {
  public:
   using Value = glm::vec4;
   explicit ColourSums(const std::vector<glm::vec4>& values) : value_(values.data()) {}
-  template <typename Offset>
-  void add(const Eight& weights, const Offset* offset) {
+  template <typename Column>
+  void add(const Eight& weights, const Column* column) {
     for (std::size_t k = 0; k < kLanes; ++k)
-      sums_[k] = _mm_add_ps(sums_[k], _mm_mul_ps(_mm_set1_ps(weights.lane[k]), _mm_loadu_ps(&value_[offset[k] / 2].x)));
+      sums_[k] = _mm_add_ps(sums_[k], _mm_mul_ps(_mm_set1_ps(weights.lane[k]), _mm_loadu_ps(&value_[column[k]].x)));
   }
   glm::vec4 total() const {
     const auto four = [&](int k) {
@@ -148,20 +146,20 @@ class ColourSums {
 #endif
 
 // Eight entries are read at the end of a row too: those that are not of it count 0.
-template <typename Sums, typename Weight, typename Offset>
-typename Sums::Value weighted_sum(Sums sums, const Weight* weight, const Offset* offset, std::size_t count) {
-  for (; count >= kLanes; count -= kLanes, weight += kLanes, offset += kLanes) sums.add(eight(weight), offset);
-  if (count > 0) sums.add(first_of(eight(weight), count), offset);
+template <typename Sums, typename Weight, typename Column>
+typename Sums::Value weighted_sum(Sums sums, const Weight* weight, const Column* column, std::size_t count) {
+  for (; count >= kLanes; count -= kLanes, weight += kLanes, column += kLanes) sums.add(eight(weight), column);
+  if (count > 0) sums.add(first_of(eight(weight), count), column);
   return sums.total();
 }
 
-// The same for a row, whichever its offsets are.
+// The same for a row, whichever its columns are.
 template <typename Sums, typename Weight>
 typename Sums::Value row_sum(const CompactColumns& columns, const std::vector<Weight>& weights, std::size_t row,
                              const Sums& sums) {
   const std::size_t begin = columns.begin[row], count = columns.begin[row + 1] - begin;
-  if (columns.are_short) return weighted_sum(sums, &weights[begin], &columns.short_offset[begin], count);
-  return weighted_sum(sums, &weights[begin], &columns.offset[begin], count);
+  if (columns.are_short) return weighted_sum(sums, &weights[begin], &columns.short_column[begin], count);
+  return weighted_sum(sums, &weights[begin], &columns.column[begin], count);
 }
 
 }  // namespace
@@ -170,17 +168,17 @@ typename Sums::Value row_sum(const CompactColumns& columns, const std::vector<We
 CompactColumns::CompactColumns(const SparseRows& rows) : begin(rows.begin) {
   const auto is_before = [](const Share& a, const Share& b) { return a.index < b.index; };
   const auto last = std::max_element(rows.entries.begin(), rows.entries.end(), is_before);
-  are_short = last == rows.entries.end() || 2 * last->index <= std::numeric_limits<std::uint16_t>::max();
-  const auto store = [&](auto& offsets) {
-    offsets.reserve(rows.entries.size() + kLanes);
+  are_short = last == rows.entries.end() || last->index <= std::numeric_limits<std::uint16_t>::max();
+  const auto store = [&](auto& columns) {
+    columns.reserve(rows.entries.size() + kLanes);
     for (const Share& share : rows.entries)
-      offsets.push_back(static_cast<typename std::decay_t<decltype(offsets)>::value_type>(2 * share.index));
-    offsets.resize(offsets.size() + kLanes, 0);
+      columns.push_back(static_cast<typename std::decay_t<decltype(columns)>::value_type>(share.index));
+    columns.resize(columns.size() + kLanes, 0);
   };
   if (are_short)
-    store(short_offset);
+    store(short_column);
   else
-    store(offset);
+    store(column);
 }
 
 ExactRows::ExactRows(const SparseRows& rows) : columns_(rows) {
@@ -193,7 +191,7 @@ std::vector<Share> ExactRows::row(std::size_t i) const {
   std::vector<Share> shares;
   for (std::size_t k = columns_.begin[i]; k < columns_.begin[i + 1]; ++k)
     shares.push_back(
-        {static_cast<int>((columns_.are_short ? columns_.short_offset[k] : columns_.offset[k]) / 2), weight_[k]});
+        {static_cast<int>(columns_.are_short ? columns_.short_column[k] : columns_.column[k]), weight_[k]});
   return shares;
 }
 

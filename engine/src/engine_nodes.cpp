@@ -1,6 +1,7 @@
 // The nodes of an engine: where light is gathered to be shown, the more densely the more it changes.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "streams.h"
 #include "transom/engine.h"
@@ -388,12 +389,14 @@ void Engine::gather_nodes(Known& known) {
   keep_node_rows(trial, known);
 }
 
-// Far patches in the rows of shown nodes give way to groups of them.
-void Engine::group_far_patches(std::vector<std::vector<Share>>& rows) const {
+// Rows of shown nodes, in which far patches have given way to groups of them; those of other nodes serve no more.
+std::vector<std::vector<Share>> Engine::with_far_patches_grouped(std::vector<std::vector<Share>> rows) const {
   const PatchGroups& groups = interreflection_->groups();
   std::vector<PatchGroups::TypicalLight> lights;
   for (const std::vector<float>& light : smooth_lights_) lights.push_back(groups.typical(light));
-  for_shown_nodes([&](std::size_t i) { rows[i] = groups.grouped(rows[i], lights, kGrouping); });
+  std::vector<std::vector<Share>> grouped(rows.size());
+  for_shown_nodes([&](std::size_t i) { grouped[i] = groups.grouped(std::exchange(rows[i], {}), lights, kGrouping); });
+  return grouped;
 }
 
 // Moves what the nodes have seen to where relighting and later edits look for it.
@@ -402,11 +405,7 @@ void Engine::keep_node_rows(NodeTrial& trial, Known& known) {
   facts_.kept_node_rows =
       static_cast<int>(std::count_if(known.node.begin(), known.node.end(), [](int node) { return node >= 0; }));
   known.has_same_nodes = known.has_same_faces() && nodes_->nodes() == known.engine->nodes_->nodes();
-  std::vector<std::vector<Share>> patches(trial.patches.size());  // of shown nodes; what others see serves no more
-  for_shown_nodes([&](std::size_t i) { patches[i] = std::move(trial.patches[i]); });
-  group_far_patches(patches);
-  node_patches_ = CompactRows(SparseRows::of(patches));
-  trial.patches.clear();
+  node_patches_ = CompactRows(SparseRows::of(with_far_patches_grouped(std::move(trial.patches))));
   node_sky_ = SkyRows(SparseRows::of(trial.rows, &GatherRow::sky), ground_bin());
   const auto found = std::make_shared<NodeRows>();
   found->reached = SparseRows::of(trial.rows, &GatherRow::reached);

@@ -165,21 +165,22 @@ bool NodeField::is_parted(const Part& part) const {
   return std::any_of(blocked, blocked + count, [](std::uint8_t b) { return b != 0; });
 }
 
-bool NodeField::is_covered(const Part& part, glm::vec3 point, glm::vec3 normal) const {
+// Along it something covers a place of a part.
+Ray NodeField::cover_ray(const Part& part, const Node& place) const {
   const glm::vec2 size = this->size(part);
-  const Ray ray{point, kCovered * std::max(size.x, size.y) * normal, 0, 1};
-  std::uint8_t blocked = 0;
-  rays_.occluded(RayScene::What::kOpaque, {&ray, 1}, {&blocked, 1});
-  return blocked != 0;
+  return {place.position, kCovered * std::max(size.x, size.y) * place.normal, 0, 1};
 }
 
 // As Part has them.
 std::uint8_t NodeField::covered_nodes(const Part& part) const {
   std::array<int, 5> nodes;
   const std::size_t node_count = nodes_of(part, nodes);
+  Ray rays[5];
+  std::uint8_t blocked[5];
+  for (std::size_t k = 0; k < node_count; ++k) rays[k] = cover_ray(part, nodes_[nodes[k]]);
+  rays_.occluded(RayScene::What::kOpaque, {rays, node_count}, {blocked, node_count});
   unsigned covered = 0;
-  for (std::size_t k = 0; k < node_count; ++k)
-    if (is_covered(part, nodes_[nodes[k]].position, nodes_[nodes[k]].normal)) covered |= 1u << k;
+  for (std::size_t k = 0; k < node_count; ++k) covered |= (blocked[k] ? 1u : 0u) << k;
   return static_cast<std::uint8_t>(covered + 1 == 1u << node_count ? 0 : covered);
 }
 
@@ -254,23 +255,23 @@ NodeShares NodeField::between_middle_and_corners(const Part& part, glm::vec2 own
 }
 
 // Where some nodes of a part are covered and others not, those speak for a place that are as it is, if it sees any.
-bool NodeField::keep_fitting(const Part& part, glm::vec3 point, glm::vec3 normal, NodeShares& shares) const {
+bool NodeField::keep_fitting(const Part& part, const Node& place, NodeShares& shares) const {
   if (part.covered != 0) {
     std::array<int, 5> nodes;
     const std::size_t node_count = nodes_of(part, nodes);
     NodeShares alike = shares;
-    const bool is_place_covered = is_covered(part, point, normal);
-    for (int k = 0; k < alike.count; ++k) {
-      const auto place =
-          std::find(nodes.begin(), nodes.begin() + static_cast<std::ptrdiff_t>(node_count), alike.node[k]);
-      if ((part.covered >> (place - nodes.begin()) & 1) != static_cast<int>(is_place_covered)) alike.weight[k] = 0;
-    }
-    if (keep_visible(point, alike)) {
+    const Ray ray = cover_ray(part, place);
+    std::uint8_t is_covered = 0;
+    rays_.occluded(RayScene::What::kOpaque, {&ray, 1}, {&is_covered, 1});
+    for (std::size_t n = 0; n < node_count; ++n)
+      for (int k = 0; k < alike.count; ++k)
+        if (alike.node[k] == nodes[n] && (part.covered >> n & 1) != (is_covered != 0)) alike.weight[k] = 0;
+    if (keep_visible(place.position, alike)) {
       shares = alike;
       return true;
     }
   }
-  return keep_visible(point, shares);
+  return keep_visible(place.position, shares);
 }
 
 bool NodeField::keep_visible(glm::vec3 point, NodeShares& shares) const {
@@ -293,8 +294,7 @@ bool NodeField::keep_visible(glm::vec3 point, NodeShares& shares) const {
 NodeShares NodeField::predict_middle(int index) const {
   const Part& part = parts_[index];
   NodeShares shares = between_corners(part, is_quad(part) ? glm::vec2(0.5f) : glm::vec2(1.f / 3));
-  const Node& middle = nodes_[part.middle_node];
-  if (part.is_split && !keep_fitting(part, middle.position, middle.normal, shares)) return {};
+  if (part.is_split && !keep_fitting(part, nodes_[part.middle_node], shares)) return {};
   return shares;
 }
 
@@ -335,11 +335,12 @@ NodeShares NodeField::interpolate(int face, Side side, glm::vec2 st, glm::vec3 l
   const bool has_middle = part.middle_node >= 0 && node_is_exposed_[part.middle_node];
   NodeShares shares = has_middle ? between_middle_and_corners(part, own) : between_corners(part, own);
   if (!part.is_split) return shares;
-  const glm::vec3 front = mesh_.faces().faces[face].shading_normal(st), normal = side == 0 ? front : -front;
-  if (keep_fitting(part, lifted_point, normal, shares)) return shares;
+  const glm::vec3 front = mesh_.faces().faces[face].shading_normal(st);
+  const Node place{lifted_point, side == 0 ? front : -front};
+  if (keep_fitting(part, place, shares)) return shares;
   if (!has_middle) return {};
   shares = between_corners(part, own);
-  return keep_fitting(part, lifted_point, normal, shares) ? shares : NodeShares{};
+  return keep_fitting(part, place, shares) ? shares : NodeShares{};
 }
 
 }  // namespace transom

@@ -222,8 +222,9 @@ class Engine:
     ) -> Frame:
         """The present light from a camera. visibility: sun by shadow rays or by stencil shadow volumes.
 
-        edge_samples: samples a pixel and axis where an edge crosses a pixel; 1: pixel centres only. components: False
-        leaves `Frame.components` empty, which is faster. A further picture of the last view, under whatever light, is
+        edge_samples: samples a pixel and axis where an edge crosses a pixel, of a surface or of a beam; a grid twice as
+        fine says how much of the pixel each side has. 1: pixel centres only. components: False leaves
+        `Frame.components` empty, which is faster. A further picture of the last view, under whatever light, is
         several times as fast as the first: what the camera sees is kept.
         """
         method = _engine.Visibility.VOLUMES if visibility == "volumes" else _engine.Visibility.RAYS

@@ -264,8 +264,8 @@ TEST(Frame, VolumesFindLightBetweenSquaresOfTheStencilWhereverItLies) {
       view.up = up;
       view.vertical_fov_rad = 2 * std::atan(0.5 * view.height * kPixel / view.position.z);
       const Frame frame = FrameRenderer(engine).render(view, *light, {Visibility::kVolumes});
-      // Sixteen samples, each in a column and a row of its own, say where light ends to 1/32 of a pixel.
-      EXPECT_NEAR(sum_of_sun(frame) * view.width / lit, kWidth, 1.0 / 16 + 1e-3) << place << ' ' << up.x;
+      // Places of the finer grid beside them say where both ends of the light are, to 1/64 of a pixel each.
+      EXPECT_NEAR(sum_of_sun(frame) * view.width / lit, kWidth, 1.0 / 32 + 1e-3) << place << ' ' << up.x;
     }
   }
 }

@@ -9,16 +9,15 @@
 
 namespace transom {
 
-/// Where the entries of sparse rows are: twice the numbers of their columns, two bytes each where these suffice.
-/// Processors address in steps of eight bytes, values of three channels and one unused stand sixteen apart.
+/// Where the entries of sparse rows are: columns take two bytes each where these suffice.
 struct CompactColumns {
   CompactColumns() = default;
   explicit CompactColumns(const SparseRows& rows);
 
   std::vector<std::size_t> begin{0};  ///< rows + 1
   bool are_short = true;
-  std::vector<std::uint16_t> short_offset;  ///< else `offset`
-  std::vector<std::uint32_t> offset;
+  std::vector<std::uint16_t> short_column;  ///< else `column`
+  std::vector<std::uint32_t> column;
 };
 
 /// Compressed sparse rows of weights in full.

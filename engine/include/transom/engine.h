@@ -203,7 +203,7 @@ class Engine {
   GatherRow surroundings_of_node(const Node& node, int known_node, const Known& known) const;
   void look_through_openings(const Node& node, int known_node, const Known& known, GatherRow& row) const;
   void gather_new_nodes(NodeTrial& trial, int first_part, Known& known);
-  void group_far_patches(std::vector<std::vector<Share>>& rows) const;
+  std::vector<std::vector<Share>> with_far_patches_grouped(std::vector<std::vector<Share>> rows) const;
   void keep_node_rows(NodeTrial& trial, Known& known);
   void resolve_near_light(const NodeTrial& trial);
   std::vector<float> find_rounds(const NodeTrial& trial);

@@ -22,8 +22,8 @@ enum class Visibility { kRays, kVolumes };
 /// Settings of a picture.
 struct FrameOptions {
   Visibility visibility = Visibility::kRays;
-  int edge_samples = 4;             ///< per pixel and axis where an edge is found; 1: pixel centres only
-  bool components = true;           ///< the parts of the picture beside their sum
+  int edge_samples = 4;    ///< per pixel and axis at an edge; twice as many say how much each side has. 1: centres only
+  bool components = true;  ///< the parts of the picture beside their sum
   const SkyPicture* sky = nullptr;  ///< what is seen of the condition's sky; null: its bins are
 };
 

@@ -127,7 +127,7 @@ class NodeField {
   int node_at(int surface, glm::vec2 st);
   std::size_t nodes_of(const Part& part, std::array<int, 5>& nodes) const;
   bool is_parted(const Part& part) const;
-  bool is_covered(const Part& part, glm::vec3 point, glm::vec3 normal) const;
+  Ray cover_ray(const Part& part, const Node& place) const;
   std::uint8_t covered_nodes(const Part& part) const;
   NodeShares between_corners(const Part& part, glm::vec2 own) const;
   NodeShares between_middle_and_corners(const Part& part, glm::vec2 own) const;
@@ -136,7 +136,7 @@ class NodeField {
   std::vector<Share> midway(const Border& border, const Lines& lines, std::span<const LightAtNodes> lights) const;
   std::vector<Share> blended(const Part& part, const std::array<std::span<const Share>, 4>& borders) const;
   bool is_open_between(int a, int b) const;
-  bool keep_fitting(const Part& part, glm::vec3 point, glm::vec3 normal, NodeShares& shares) const;
+  bool keep_fitting(const Part& part, const Node& place, NodeShares& shares) const;
   bool keep_visible(glm::vec3 point, NodeShares& shares) const;
 
   const LightMesh& mesh_;
